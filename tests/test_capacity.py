@@ -193,3 +193,10 @@ def test_another_machine_has_a_capacity_of_its_own_numbers(name, value):
     lines = {line.name: line for line in capacity_table(load_machine("uniaxial"))}
     assert lines[name].model == pytest.approx(value, rel=1e-5)
     assert payload_table(load_machine("uniaxial")) == flow_readings(load_machine("uniaxial")) == ()
+
+
+def test_the_command_prints_the_capacity_of_a_table_without_table_2_2(lhpost6):
+    ended = lhpost6("capacity", "--machine", "uniaxial")
+    assert ended.code == 0
+    for words in ("peak force X 0.121 – MN", "peak velocity x 0.397 0.4 m/s", "x acceleration 2.04 g stated limit"):
+        assert words in ended.words

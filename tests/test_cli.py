@@ -444,10 +444,14 @@ def test_open_loop_drives_the_plant_with_a_records_spools(lhpost6, tmp_path, eng
     ended = lhpost6("open-loop", record, "--engine", engine)
     assert ended.code == 0 and "Model against record" in ended.words
     folder = tmp_path / "out" / f"{record.stem}_open_loop"
-    assert [p.name for p in folder.iterdir()] == ["record.nc"]
-    assert "report.html" not in ended.words
-    assert [f for f in check_record(folder / "record.nc") if f.severity == "error"] == []
-    simulated = load_record(folder / "record.nc")
+    assert sorted(p.name for p in folder.iterdir()) == ["record.nc", "report.html"]
+    simulated = sound(folder)
+    page = (folder / "report.html").read_text()
+    assert "Driven by the recorded spools, the model differs by an RRMSE of displacement" in page
+    assert all(
+        title in page
+        for title in ("Axis x (longitudinal)", "Pressures in chambers A, H1 to H4", "Table of differences")
+    )
     assert simulated.attrs["spool_interpolation"] == how and record.name in simulated.attrs["source"]
     row = next(line for line in ended.out.splitlines() if re.match(r"│ platen_displacement x +│", line))
     assert (
@@ -466,10 +470,44 @@ def test_a_record_is_not_replayed_without_its_specimen_nor_over_itself(lhpost6, 
     assert refused(lhpost6("open-loop", tmp_path / "anonymous.nc"), "specimen 'pendulum'", "--specimen")
     replaced = lhpost6("open-loop", record, *mounted, "--out", tmp_path / "made")
     assert refused(replaced, "would be replaced by its own replay", "--out") and record.read_bytes() == before
-    (tmp_path / "two words; and more").mkdir()
-    (tmp_path / "two words; and more" / "report.html").write_text("older")
     ended = lhpost6("open-loop", record, "--out", tmp_path / "two words; and more")  # mounts what the record states
-    assert ended.code == 0 and "report.html" not in ended.words  # which an earlier run left
+    assert ended.code == 0 and sound(tmp_path / "two words; and more").attrs["specimen"] == "pendulum"
+
+
+ANALYSES = ("decompose", "validate", "calibrate", "discover", "view", "open-loop")
+"""Commands that take records made with a specimen."""
+
+
+@pytest.mark.parametrize("command", ANALYSES)
+def test_commands_that_take_records_can_mount_the_specimen_that_they_ask_for(lhpost6, tmp_path, command):
+    record = load_record(PRACTICE).assign_attrs(specimen="tower", specimen_file=str(tmp_path / "tower.urdf"))
+    record = record.assign_attrs(specimen_position=np.zeros(3), specimen_rpy=np.zeros(3), specimen_locked=1)
+    (tmp_path / "tests").mkdir()
+    save_record(record, tmp_path / "tests" / "TX.nc")
+    taken = "tests" if command in ("validate", "calibrate", "discover") else "tests/TX.nc"
+    more = ("--export", "page.html") if command == "view" else ("--out", "out")
+    if command != "view":
+        assert refused(lhpost6(command, taken, *more), "tower.urdf, which is not there; mount it with --specimen FILE")
+    absent = lhpost6(command, taken, *more, "--specimen", "absent.urdf")
+    assert refused(absent, "absent.urdf: no such URDF file")  # the option is there, and is taken
+
+
+def test_a_view_mounts_what_the_record_states_and_warns_where_it_cannot(lhpost6, tmp_path, caplog):
+    mounted = ("--specimen", "pendulum", "--specimen-at", "1,0.5,0", "--locked")
+    assert lhpost6("run", *COARSE, *mounted, "--out", "made").code == 0
+    record = load_record(tmp_path / "made" / "record.nc")
+    moved, old = record.assign_attrs(specimen_file="/elsewhere/pendulum.urdf"), record.copy()
+    del old.attrs["specimen_file"]  # as records of earlier versions
+    sizes, warned = {}, {"stated": "", "moved": "elsewhere/pendulum.urdf, which is not there", "old": "not stated"}
+    for name, shown in (("stated", record), ("moved", moved), ("old", old)):
+        save_record(shown, tmp_path / f"{name}.nc")
+        caplog.clear()
+        ended = lhpost6("view", f"{name}.nc", "--export", f"{name}.html")
+        assert ended.code == 0 and warned[name] in caplog.text
+        assert ("it is not drawn" in caplog.text) == (name != "stated")
+        sizes[name] = (tmp_path / f"{name}.html").stat().st_size
+    assert sizes["stated"] > sizes["old"]  # the pendulum's shapes
+    assert abs(sizes["moved"] - sizes["old"]) < 1000
 
 
 def test_open_loop_replays_a_record_of_another_machine_on_that_machine_only(lhpost6, tmp_path):
@@ -518,7 +556,8 @@ def test_a_run_that_leaves_its_stroke_exits_1_keeps_what_was_done_and_says_when_
     assert found[0] in record.attrs["trouble"]
     # the last sample is at most two before the stop: one of the record's end, one of rounding in the message
     assert float(record["time"][-1]) == pytest.approx(float(found[1]), abs=2 / 2048)
-    assert [f for f in check_record(tmp_path / "here" / "record.nc") if f.severity == "error"] == []
+    sound(tmp_path / "here")
+    assert f"The replay {found[0]}" in (tmp_path / "here" / "report.html").read_text()
 
 
 def test_a_run_that_diverges_exits_1_with_a_record_and_a_report_that_says_so(lhpost6, tmp_path):

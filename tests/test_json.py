@@ -130,7 +130,7 @@ def test_a_run_states_what_was_run_on_what(said, tmp_path):
 def test_an_open_loop_states_the_comparison(said):
     entries, _ = said("open-loop", REFERENCE, "--engine", "fused")
     x = next(row for row in entries["against_record"] if row["channel"] == "platen_displacement x")
-    assert {"seconds", "scheme", "engine", "trouble", "files"} <= set(entries)
+    assert {"seconds", "scheme", "engine", "trouble", "verdict", "level", "files"} <= set(entries)
     assert x["unit"] == "m" and x["largest_difference"] < 1e-3 * x["peak_recorded"]  # the same equations
 
 

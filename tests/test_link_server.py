@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from unittest import mock
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from commands import own_controller, refused
 from run_cases import amid_ridgecrest, at_rest
@@ -32,8 +33,11 @@ from lhpost6_pin.interfaces.link import (
     run_over_link,
     serve,
 )
+from lhpost6_pin.interfaces.link.remote import LinkRun
 from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.coupled import BaseMotion
 from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.simulation.simulate import ClosedLoop, PluggedLoop, simulate
 
 pytestmark = pytest.mark.long
@@ -96,7 +100,13 @@ def test_the_closed_loop_over_udp_is_the_loop_in_one_process_sample_for_sample(p
     assert np.array_equal(run.command, alone.command)
     assert counts["samples"] == 1500 and run.answered.all() and not run.tripped
     assert counts["lost"] == counts["late"] == counts["malformed"] == counts["foreign"] == 0
-    record = record_of_link_run(run, plant, {"test": "link"})
+    assert run.trouble is None
+    moved = platen_motion(plant, alone.q, alone.v, alone.a)
+    record = record_of_link_run(run, plant, {"test": "link"}, moved)
+    for name in ("displacement", "velocity"):  # as they travel: Euler angles, and the twist at C in platen axes
+        found, own = record[f"platen_{name}"].values, getattr(moved, name)
+        np.testing.assert_allclose(found, own, rtol=0.0, atol=1e-12 * np.abs(own).max())
+        assert np.array_equal(record[f"reference_{name}"].values, own)
     save_record(record, tmp_path / "record.nc")
     again = load_record(tmp_path / "record.nc", {"actuator": plant.machine.actuator_names})
     assert np.array_equal(again["spool_command"].values, alone.command)
@@ -165,6 +175,30 @@ def test_a_plant_that_moves_by_itself_is_driven_to_the_end_and_every_sample_is_a
     assert np.array_equal(run.command[held], run.command[held - 1])
 
 
+@pytest.mark.parametrize(
+    ("holding", "silent", "trouble"),
+    [
+        ((), (), None),
+        ((), range(100, 104), None),  # four missed samples are bridged
+        ((), range(100, 105), "lost its commands: 1 safe hold, the first at 0.0488 s"),
+        (range(500, 600), (), "lost its commands: 1 safe hold, the first at 0.2441 s"),
+        (
+            range(500, 600),
+            (*range(300, 350), *range(490, 500)),
+            "lost its commands: 2 safe holds, the first at 0.1465 s",
+        ),
+    ],
+)
+def test_a_run_that_went_to_its_safe_hold_is_in_trouble(plant, rest, holding, silent, trouble):
+    n, none = 1000, np.zeros((1000, 10))
+    state, answered = np.full(n, PlantState.RUNNING, np.int8), np.ones(n, bool)
+    state[list(holding)], answered[list(silent)] = PlantState.HOLD, False
+    still = BaseMotion(pin.SE3.Identity(), pin.Motion.Zero(), pin.Motion.Zero())
+    run = LinkRun(none, none, np.zeros((n, 6)), [still] * n, none, state, answered, False, 1.0)
+    assert (run.trouble or "none").partition(";")[0] == (trouble or "none")
+    assert record_of_link_run(run, plant, {}).attrs["trouble"] == (run.trouble or "none")
+
+
 def test_a_trip_ends_the_run_and_the_next_client_finds_the_plant_at_rest(plant, rest):
     loop = PluggedLoop(Wild(), *wanted(8000), rest)
     with served(plant, rest) as (_, address):
@@ -172,7 +206,11 @@ def test_a_trip_ends_the_run_and_the_next_client_finds_the_plant_at_rest(plant, 
             run = run_over_link(client, plant, loop)
             assert client.reading.state == PlantState.TRIPPED
         assert run.tripped and 10 < len(run.command) < 8000
-        assert record_of_link_run(run, plant, {}).attrs["trouble"] == "the plant tripped"
+        assert (
+            record_of_link_run(run, plant, {})
+            .attrs["trouble"]
+            .startswith(f"stopped at {len(run.command) / 2048:.4f} s: the plant tripped")
+        )
         with LinkClient(*address) as client:
             assert client.reading.sample == 0 and client.reading.state == PlantState.WAITING
 
@@ -335,6 +373,12 @@ def test_a_motion_runs_across_processes_and_leaves_its_record(tmp_path, lhpost6)
     record = load_record(tmp_path / "out" / "record.nc")
     assert record.attrs["title"] == "sine at scale 0.2 over the link"
     assert record.attrs["link_mode"] == "lock-step" and record.attrs["lost"] == 0
+    assert record.attrs["scale"] == 0.2 and record.attrs["controller"] == load_controller("lhpost6").name
+    peak = np.abs(record["reference_displacement"].values[:, 0]).max()
+    assert peak == pytest.approx(0.2 * 0.02, rel=1e-2)  # m
+    assert np.abs(record["platen_displacement"].values[:, 0]).max() == pytest.approx(peak, rel=0.3)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "Track a motion on 1 of 6 axes" in page and "Demand over capacity" in page
     assert record.attrs["samples"] == record.sizes["time"] and str(tmp_path / "out") in ended.words.replace(" ", "")
 
 

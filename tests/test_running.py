@@ -1,5 +1,6 @@
 """The plant sample by sample: the same run as `simulate`'s, what it refuses, and what is seen of it on the way."""
 
+import signal
 import time
 
 import numpy as np
@@ -12,6 +13,7 @@ from run_cases import amid_ridgecrest, at_rest
 from lhpost6_pin.cli import live_view as live
 from lhpost6_pin.core.errors import SimulationError
 from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE, SCHEMES
+from lhpost6_pin.data.records import load_record
 from lhpost6_pin.interfaces.link.protocol import Datagram, Kind, LinkMode, encode
 from lhpost6_pin.interfaces.link.served import ServedPlant
 from lhpost6_pin.machine.machine import load_machine
@@ -202,3 +204,39 @@ def test_a_run_can_be_watched_from_the_command_line(lhpost6, monkeypatch, tmp_pa
     ended = lhpost6("run", *SHORT, "--live", "--no-open", "--out", tmp_path)
     assert ended.code == 0 and "http://127.0.0.1:" in ended.out and "no viewer connected" in ended.err
     assert (tmp_path / "record.nc").is_file()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_run_that_is_stopped_keeps_what_was_done(plant, loop, engine):
+    polled: list[bool] = []
+
+    def stop() -> bool:
+        polled.append(len(polled) == 3)
+        return polled[-1]
+
+    run = simulate(plant, loop, samples=4000, engine=engine, stop=stop)
+    whole = simulate(plant, loop, samples=4000, engine=engine)
+    done = 3 * EVERY + (engine == "pinocchio")  # it has recorded the sample at which it ends
+    assert len(run.time) == done and len(polled) == 4
+    for name in ("q", "v", "a", "z", "spool", "command"):
+        assert np.array_equal(getattr(run, name), getattr(whole, name)[:done]), name
+    assert run.trouble is not None and run.trouble.startswith(f"stopped at {done / SAMPLE_RATE:.4f} s: interrupted")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_live_run_ended_by_a_signal_leaves_record_and_report(lhpost6, monkeypatch, tmp_path, number):
+    monkeypatch.setattr(live, "PATIENCE", 0.0)
+    before = [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)]
+
+    def show(self: LiveView, snapshot: Snapshot) -> None:
+        if snapshot.time == 8 * EVERY / SAMPLE_RATE:
+            signal.raise_signal(number)
+
+    monkeypatch.setattr(LiveView, "show", show)
+    ended = lhpost6("run", *SHORT, "--live", "--no-open", "--json", "--out", tmp_path)
+    assert ended.code == 1 and "Traceback" not in ended.words
+    assert [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)] == before
+    record = load_record(tmp_path / "record.nc")
+    assert record.sizes["time"] == 8 * EVERY and "interrupted by a signal" in record.attrs["trouble"]
+    assert "The run stopped at 0.2500 s: interrupted by a signal" in (tmp_path / "report.html").read_text()

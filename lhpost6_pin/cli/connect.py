@@ -19,6 +19,7 @@ from .options import (
     Valves,
     find_controller,
 )
+from .rehearse import write_test_report
 
 __all__ = ["export_fmu", "link", "serve", "serve_specimen"]
 
@@ -111,13 +112,16 @@ def link(
     valves: Valves = 0,
     json: Json = False,
 ) -> None:
-    """Run the virtual 469D, or your own controller, against a table behind `lhpost6 serve`; writes record.nc."""
+    """Run the virtual 469D, or your own controller, against `lhpost6 serve`; writes record.nc and report.html."""
     from ..data.records import save_record
     from ..interfaces.link import LinkClient, record_of_link_run, run_over_link
     from ..interfaces.link.link_summary import link_entries, print_link
     from ..mechanics.equilibrium import find_equilibrium
     from ..mechanics.plant import make_plant
-    from ..simulation.rehearse import loop_for
+    from ..mechanics.pose import PlatenMotion
+    from ..show.results import summary_entries
+    from ..show.tables import print_summary
+    from ..simulation.rehearse import loop_for, test_facts
     from ..tuning.cancel import cancelling
 
     table = machine.load(valves)
@@ -135,16 +139,22 @@ def link(
     counts |= {"resent": client.resent, "sensors_lost": client.sensors_lost, "ignored": client.ignored}
     counts["unanswered"] = int((~done.answered).sum())
     attrs = {"test": name, "title": f"{target.reference.title} over the link", "link_mode": client.mode.label}
-    attrs |= target.reference.facts
-    path = folder / "record.nc"
-    save_record(record_of_link_run(done, plant, {**attrs, **counts}), path)
+    wanted = PlatenMotion(target.displacement, target.velocity, target.acceleration)
+    record = record_of_link_run(done, plant, {**attrs, **test_facts(chosen, target), **counts}, wanted)
+    files = [folder / "record.nc", folder / "report.html"]
+    save_record(record, files[0])
+    notes = [*filter(None, [done.trouble])]
+    if counts["unanswered"]:
+        notes.append(f"{counts['unanswered']} of {len(done.answered)} samples were not answered in time")
+    summary = write_test_report(plant, record, files[1], notes)
     times = {"command to sensors": client.round_trip}
-    print_result(
-        json,
-        lambda: {**link_entries(counts, times), "tripped": done.tripped},
-        lambda: print_link(f"{name}, {client.mode.label}", counts, times),
-        [path],
-    )
-    if done.tripped:
-        stderr().print("the plant tripped: an actuator reached its stroke limit, or the run diverged; see the server")
+
+    def show() -> None:
+        print_link(f"{name}, {client.mode.label}", counts, times)
+        print_summary(summary)
+
+    outcome = {"tripped": done.tripped, "trouble": done.trouble}
+    print_result(json, lambda: {**link_entries(counts, times), **outcome, **summary_entries(summary)}, show, files)
+    if done.trouble:
+        stderr().print(f"the run {done.trouble}", markup=False)
         raise typer.Exit(1)

@@ -1,6 +1,7 @@
 """A live view of the table while a command moves it."""
 
-from collections.abc import Iterator
+import signal
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +12,7 @@ if TYPE_CHECKING:
     from ..machine.machine import Machine
     from ..simulation.snapshot import Watch
 
-__all__ = ["LiveOptions", "NoOpen", "ViewOptions", "show_address", "watched"]
+__all__ = ["LiveOptions", "NoOpen", "ViewOptions", "ended_by_signal", "show_address", "watched"]
 
 NoOpen = Annotated[bool, typer.Option("--no-open", help="Print the address of the page; do not open a browser.")]
 
@@ -64,6 +65,23 @@ def watched(
         if not view.wait(PATIENCE):
             typer.echo(f"no viewer connected for {PATIENCE:g} s; continuing", err=True)
         yield view.show
+
+
+@contextmanager
+def ended_by_signal(options: LiveOptions) -> "Iterator[Callable[[], bool] | None]":
+    """Yield whether Ctrl-C or SIGTERM has come, which then only ends the run on view; None unless it is viewed live."""
+    if not options.live:
+        yield None
+        return
+    received: list[int] = []
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number in before:
+        signal.signal(number, lambda number, _: received.append(number))
+    try:
+        yield lambda: bool(received)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def show_address(url: str, what: str, open_it: bool, err: bool = False) -> None:

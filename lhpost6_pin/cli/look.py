@@ -3,13 +3,19 @@
 import logging
 import threading
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..core.errors import RecordError
 from .app import command, print_result, repeating_command
 from .live_view import ViewOptions, show_address
 from .options import Json, MachineOptions, SpecimenOptions, Valves, folder_for
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from ..machine.machine import Machine
 
 log = logging.getLogger(__name__)
 
@@ -29,17 +35,15 @@ def view(
     fps: Annotated[float, typer.Option(min=1.0, max=240.0, help="Frames per second.")] = 30.0,
     json: Json = False,
 ) -> None:
-    """Animate a test in a browser or in one HTML file: platen, actuators, struts and force arrows."""
+    """Animate a test in a browser or in one HTML file: platen, actuators, struts and force arrows.
+
+    Without --specimen, the one that the record states is mounted, where its file is there.
+    """
     from ..data.records import load_record
     from ..show.viewer import Look, live_animation, show_record
 
     test, over = load_record(record), [load_record(path) for path in others or []]
-    table = machine.onto_for(machine.load_bare(), [test])
-    if table.specimen is None and (carried := str(test.attrs.get("specimen", "none"))) != "none":
-        log.warning(
-            "%s was made with specimen %r, and its place is not stated: it is not drawn; mount it with --specimen",
-            record, carried,
-        )  # fmt: skip
+    table = _mounted(machine, test, record)
     look = Look(fps, options.amplify, gap, options.force_change)
     if export is not None:
         show_record(table, test, over, look).save(export)
@@ -52,6 +56,22 @@ def view(
             threading.Event().wait()
         except KeyboardInterrupt:
             typer.echo("ended")
+
+
+def _mounted(machine: SpecimenOptions, test: "xr.Dataset", record: Path) -> "Machine":
+    """The table with the chosen specimen or the one that a record states; a warning if that cannot be drawn."""
+    bare = machine.load_bare()
+    try:
+        table = machine.onto_for(bare, [test])
+    except RecordError as error:
+        log.warning("%s; it is not drawn", error)
+        return bare
+    if table.specimen is None and (carried := str(test.attrs.get("specimen", "none"))) != "none":
+        log.warning(
+            "%s was made with specimen %r, and its place is not stated: it is not drawn; mount it with --specimen",
+            record, carried,
+        )  # fmt: skip
+    return table
 
 
 @command()

@@ -12,14 +12,16 @@ from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import complete_motion
-from .live_view import LiveOptions, watched
+from .live_view import LiveOptions, ended_by_signal, watched
 from .loop_check import LOOP_FACTS, checked_loop, interaction_of, loop_facts, retuned
 from .motion_options import MotionOptions
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ..mechanics.plant import Plant
     from ..motions import Target
+    from ..show.report.run_report import RunSummary
     from ..simulation.loops import ClosedLoop, PluggedLoop
     from ..simulation.rehearse import SimulatedTest
     from ..tuning.interaction import Interaction
@@ -29,7 +31,7 @@ log = logging.getLogger(__name__)
 TEST_FACTS = ("machine", "motion", "scale", "specimen", "effects", "overrides")
 """Attributes of a record that say what was run on what, for `--json`."""
 
-__all__ = ["campaign", "motions", "open_loop", "run", "save_run"]
+__all__ = ["campaign", "motions", "open_loop", "run", "save_run", "write_test_report"]
 
 
 @command()
@@ -52,7 +54,10 @@ def run(
     record_rate: Annotated[int, typer.Option(help="Samples per second of the record, a divisor of 2048.")] = 2048,
     json: opt.Json = False,
 ) -> None:
-    """Run a motion in closed loop on the virtual table; writes record.nc and report.html."""
+    """Run a motion in closed loop on the virtual table; writes record.nc and report.html.
+
+    With --live, Ctrl-C or SIGTERM ends the motion, and what was done is written.
+    """
     from ..control import ControllerSettings
     from ..control.inverse import load_inverse
     from ..simulation.compile_ahead import compile_ahead, wait_for
@@ -85,7 +90,11 @@ def run(
     loop = checked_loop(table, chosen, machine, retune=not retune)
     title = f"{target.reference.title} on {table.name}"
     wait_for(compiling)
-    with watched(view, table, title, err=json) as watch, progress_bar(f"{name} on {table.name}") as progress:
+    with (
+        watched(view, table, title, err=json) as watch,
+        ended_by_signal(view) as stop,
+        progress_bar(f"{name} on {table.name}") as progress,
+    ):
         test = rehearse(
             table,
             target,
@@ -97,6 +106,7 @@ def run(
             beyond_limits=True,
             progress=progress,
             watch=watch,
+            stop=stop,
             **options,
         )
     shown = interaction_of(table, given, chosen, inverse)
@@ -120,7 +130,7 @@ def open_loop(
     out: opt.Out = None,
     json: opt.Json = False,
 ) -> None:
-    """Drive the plant in open loop with recorded spool positions, from the recorded pressures; writes record.nc."""
+    """Drive the plant by recorded spools from recorded pressures (open loop); writes record.nc and report.html."""
     from ..data.records import load_record
     from ..simulation.rehearse import replay
 
@@ -204,58 +214,73 @@ def save_run(
     interaction: "Interaction | None" = None,
     more: Sequence[Path] = (),
 ) -> None:
-    """Write the record and, unless it is compared `against` a measured test, the report; print a summary.
+    """Write the record and the report, a comparison if it is `against` a measured test; print a summary.
 
     interaction: of table and specimen, for the report; more: files that were written before.
 
     Raises typer.Exit if the run stopped on the way.
     """
     from ..data.records import save_record
-    from ..mechanics.specimen_joints import joints_beyond, specimen_doubts
+    from ..data.replay_comparison import compare
+    from ..mechanics.specimen_joints import joints_beyond
+    from ..show.report.open_loop_report import write_open_loop_report
     from ..show.results import run_entries
-    from ..show.tables import compare, machine_rows, print_comparison, print_run
+    from ..show.tables import machine_rows, print_comparison, print_run
     from ..simulation.coupling import DOUBTFUL
     from ..simulation.trouble import run_doubts
 
     done, record = test
-    files, summary = [*more, folder / "record.nc"], None
-    save_record(record, files[-1])
+    files, summary = [*more, folder / "record.nc", folder / "report.html"], None
+    save_record(record, files[-2])
     beyond = [*joints_beyond(done.plant, done.time, done.q), *run_doubts(done)]
     for warning in beyond:
         log.warning("%s", warning)
     exchanged = done.coupling
     doubts = [exchanged.summary] if exchanged and abs(exchanged.energy_error) > DOUBTFUL else []
+    notes = [*filter(None, [done.trouble]), *beyond, *doubts]
+    entries: dict[str, Any]
     if against is None:
-        from ..show.capacity_tables import judged, performance_loads
-        from ..show.report.run_report import write_run_report
-        from ..simulation.limit_use import plant_limits
-
-        demands, fits = judged(done.plant, record)
-        files.append(folder / "report.html")
-        summary = write_run_report(
-            record,
-            files[-1],
-            limits=plant_limits(done.plant),
-            notes=[*filter(None, [done.trouble]), *specimen_doubts(done.plant), *beyond, *doubts],
-            command=repeating_command(),
-            machine_table=machine_rows(done.plant.machine),
-            interaction=interaction,
-            demands=demands,
-            loads=performance_loads(done.plant.machine, payload=False),
-            fits=fits,
+        summary = write_test_report(done.plant, record, files[-1], notes, interaction=interaction)
+        entries = {key: record.attrs.get(key) for key in LOOP_FACTS}
+    else:
+        compared, rows = compare(against, record), machine_rows(done.plant.machine)
+        command = repeating_command()
+        verdict, level = write_open_loop_report(
+            against, record, compared, files[-1], notes=notes, command=command, machine_table=rows
         )
-    compared = [] if against is None else compare(against, record)
+        entries = {"verdict": verdict, "level": level, "against_record": compared}
 
     def show() -> None:
-        if compared:
+        if against is not None and compared:
             print_comparison(compared)
         print_run(done, summary)
 
-    def entries() -> dict[str, Any]:
-        loop = {} if summary is None else {key: record.attrs.get(key) for key in LOOP_FACTS}
-        test = {key: record.attrs.get(key) for key in TEST_FACTS}
-        return test | run_entries(done, summary) | loop | ({} if against is None else {"against_record": compared})
-
-    print_result(json, entries, show, files)
+    facts = {key: record.attrs.get(key) for key in TEST_FACTS}
+    print_result(json, lambda: facts | run_entries(done, summary) | entries, show, files)
     if done.trouble:
         raise typer.Exit(1)
+
+
+def write_test_report(
+    plant: "Plant", record: "xr.Dataset", path: Path, notes: Sequence[str], interaction: "Interaction | None" = None
+) -> "RunSummary":
+    """Write the report of a test on a plant, with its limits and what its motion demands; returns its summary."""
+    from ..mechanics.specimen_joints import specimen_doubts
+    from ..show.capacity_tables import judged, performance_loads
+    from ..show.report.run_report import write_run_report
+    from ..show.tables import machine_rows
+    from ..simulation.limit_use import plant_limits
+
+    demands, fits = judged(plant, record)
+    return write_run_report(
+        record,
+        path,
+        limits=plant_limits(plant),
+        notes=[*notes, *specimen_doubts(plant)],
+        command=repeating_command(),
+        machine_table=machine_rows(plant.machine),
+        interaction=interaction,
+        demands=demands,
+        loads=performance_loads(plant.machine, payload=False),
+        fits=fits,
+    )

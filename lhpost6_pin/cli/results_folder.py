@@ -14,9 +14,7 @@ log = logging.getLogger(__name__)
 
 Out = Annotated[
     Path | None,
-    typer.Option(
-        help="Directory of the results; default: out/NAME. Earlier files are replaced, with a warning."
-    ),
+    typer.Option(help="Directory of the results; default: out/NAME. Earlier files are replaced, with a warning."),
 ]
 ResumedOut = Annotated[
     Path | None,

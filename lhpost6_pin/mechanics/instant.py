@@ -19,7 +19,7 @@ from .plant import Plant
 from .port_path import ports_along
 from .pose import PlatenMotion, leg_displacements, plant_motion
 
-__all__ = ["displacement_of", "legs_at", "platen_pose_at", "required_wrench_at", "wrench_at"]
+__all__ = ["displacement_of", "legs_at", "motion_at", "platen_pose_at", "required_wrench_at", "wrench_at"]
 
 
 def platen_pose_at(displacement: ArrayLike) -> pin.SE3:
@@ -31,6 +31,13 @@ def platen_pose_at(displacement: ArrayLike) -> pin.SE3:
 def displacement_of(pose: pin.SE3) -> Array:
     """Platen displacement (6,) of a pose, the inverse of `platen_pose_at`."""
     return np.concatenate([pose.translation, pin.rpy.matrixToRpy(pose.rotation)])
+
+
+def motion_at(pose: pin.SE3, twist: pin.Motion) -> tuple[Array, Array]:
+    """Displacement and velocity (6,) of C in {s} and Euler angles, of a pose and the twist at C in platen axes."""
+    displacement = displacement_of(pose)
+    turning = np.linalg.solve(pin.rpy.computeRpyJacobian(displacement[3:], pin.LOCAL), twist.angular)
+    return displacement, np.concatenate([pose.rotation @ twist.linear, turning])
 
 
 def wrench_at(plant: Plant, pose: pin.SE3, force: ArrayLike) -> pin.Force:

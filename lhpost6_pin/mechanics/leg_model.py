@@ -115,13 +115,19 @@ def _axes_along(direction: Array) -> Array:
     return np.column_stack([x, y, np.cross(x, y)])
 
 
-def make_dynamics(plant: Plant) -> Dynamics:
+def make_dynamics(plant: Plant, armature: Array | None = None) -> Dynamics:
     """Forward dynamics of a plant on Pinocchio: ABA, with moving parts as bodies the projection of CRBA and RNEA.
+
+    armature (nv,): inertia of the coordinates beside the model's own.
 
     ABA divides the torque by the mass M of platen and specimen as a rigid body; modes leave M - sum G G^T (`modes`),
     both constant in platen axes: its acceleration is (M - sum G G^T)^-1 M times that of ABA.
     """
-    model, data, free = plant.model, plant.model.createData(), np.ix_(plant.axes, plant.axes)
+    model, free = plant.model, np.ix_(plant.axes, plant.axes)
+    if armature is not None:
+        model = model.copy()
+        model.armature = model.armature + armature
+    data = model.createData()
     modal = plant.tables.inertia[0]["modal"][free]
     if plant.machine.bodies == "lumped":
         aba = partial(pin.aba, model, data)

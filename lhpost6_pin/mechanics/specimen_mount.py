@@ -17,6 +17,11 @@ from ..machine.urdf_numbers import check_urdf
 
 __all__ = ["base_placement", "base_twist", "modal_participation", "mount_specimen", "placement_of", "top_placement"]
 
+_NO_INERTIA = 1e-12
+"""Share of the largest eigenvalue of a mass matrix below which one is rounding."""
+_TAKES_PART = 0.1
+"""Least share of a joint in a motion without inertia."""
+
 
 def top_placement(machine: Machine) -> pin.SE3:
     """Placement in {b} of C with the platen's axes: the platen's top frame."""
@@ -54,16 +59,43 @@ def _mount_urdf(model: Any, specimen: Specimen, at: pin.SE3) -> Any:
     except Exception as error:  # urdfdom reports malformed files as plain exceptions
         raise ParameterError(f"{urdf}: not a URDF that Pinocchio can read: {error}") from error
     _add_dampers(body, specimen)
+    _rename_links(body, model)
     if specimen.locked and body.njoints > 1:
         body = pin.buildReducedModel(body, list(range(1, body.njoints)), pin.neutral(body))
     if sum(i.mass for i in body.inertias) <= 0.0:
         raise ParameterError(f"{urdf}: the specimen has no mass; give its links <inertial> elements")
+    if lacking := _joints_without_inertia(body):
+        raise ParameterError(
+            f"{urdf}: nothing determines the acceleration of {', '.join(lacking)}: the links that move with it have no "
+            "inertia; give them <inertial> elements, make the joint fixed, or lock all joints (--locked)"
+        )
     try:
         joined = pin.appendModel(model, body, model.getFrameId("platen_top"), at)
-    except ValueError as error:  # a joint or frame named as one of the platen's
-        raise ParameterError(f"{urdf}: {error}; rename it in the URDF") from error
+    except ValueError as error:  # a joint named as the platen's
+        raise ParameterError(f"{urdf}: {error} ({model.names[1]}); rename the specimen's in the URDF") from error
     joined.gravity = model.gravity
     return joined
+
+
+def _rename_links(body: Any, model: Any) -> None:
+    """Rename links that share their name with a joint or a part of the platen: Pinocchio finds frames by name alone."""
+    taken = {str(frame.name) for frame in (*model.frames, *body.frames) if frame.type != pin.FrameType.BODY}
+    names = taken | {str(frame.name) for frame in body.frames}
+    for frame in body.frames:
+        if frame.type == pin.FrameType.BODY and frame.name in taken:
+            while frame.name in names:
+                frame.name += "_link"
+            names.add(frame.name)
+
+
+def _joints_without_inertia(body: Any) -> list[str]:
+    """Joints that can move without moving any inertia in the neutral position: the null space of the mass matrix."""
+    if body.nv == 0:
+        return []
+    values, vectors = np.linalg.eigh(pin.crba(body, body.createData(), pin.neutral(body)), UPLO="U")
+    share = (vectors[:, values <= _NO_INERTIA * values[-1]] ** 2).sum(axis=1)
+    ends = zip(body.names, body.idx_vs, body.nvs, strict=True)
+    return [str(name) for name, at, size in list(ends)[1:] if share[at : at + size].max() > _TAKES_PART]
 
 
 def _add_dampers(body: Any, specimen: Specimen) -> None:

@@ -33,6 +33,7 @@ __all__ = [
     "motion_entries",
     "run_entries",
     "sine_entries",
+    "summary_entries",
     "tuning_entries",
 ]
 
@@ -101,10 +102,13 @@ def run_entries(run: "Run", summary: "RunSummary | None") -> Entries:
     if run.coupling is not None:
         stability = _picked(run.coupling.stability, "spectral_radius", "growth")
         entries["interface"] = _picked(run.coupling, "energy", "energy_error") | stability
-    if summary is None:
-        return entries
+    return entries if summary is None else entries | summary_entries(summary)
+
+
+def summary_entries(summary: "RunSummary") -> Entries:
+    """Verdict, tracking and demand over capacity of a run's report."""
     names = ("axis", "quantity", "peak_target", "peak_achieved", "rrmse", "delay", "rrmse_aligned")
-    return entries | {
+    return {
         **_picked(summary, "verdict", "level"),
         "tracking": [_picked(row, *names) for row in summary.tracking if row.peak_target],
         "intensity": {one.axis: _intensity(one) for one in summary.measures if one.intensity},

@@ -1,29 +1,24 @@
 """Tables for a terminal: machine, capacity, motions, findings, runs; and their rows for reports."""
 
-import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.text import Text
 
 from ..machine.machine import Machine
 from .report.page import Table
-from .report.scales import percent
 from .terminal import print_blocks
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from ..data.consistency import ConsistencyFinding
     from ..data.layout_faults import RecordFinding
+    from ..data.replay_comparison import Compared
     from ..effects.effect import Effect
     from ..simulation.simulate import Run
     from .report.run_report import RunSummary
 
 __all__ = [
-    "Compared",
-    "compare",
     "machine_rows",
     "print_comparison",
     "print_findings",
@@ -32,6 +27,7 @@ __all__ = [
     "print_motions",
     "print_run",
     "print_sensor_findings",
+    "print_summary",
 ]
 
 
@@ -164,70 +160,28 @@ def print_sensor_findings(findings: "Sequence[ConsistencyFinding]") -> None:
     print_blocks(f"redundant sensors: {counts}")
 
 
-_COMPARED = ("platen_displacement", "chamber_pressure_a", "chamber_pressure_b", "actuator_force")
-_SILENT = 1e-6
-"""Fraction of the largest peak of its kind below which a channel is at rest and has no relative error."""
-
-
-class Compared(NamedTuple):
-    """Difference of a replayed channel from the recorded one, in `unit`."""
-
-    channel: str
-    unit: str
-    peak_recorded: float
-    largest_difference: float
-    rrmse: float  # not-a-number for a channel at rest
-    drift: float  # of the difference [unit/s]
-
-
-def compare(measured: "xr.Dataset", simulated: "xr.Dataset") -> list[Compared]:
-    """Differences of a replayed test from the recorded one by channel, on common samples; empty below two."""
-    from ..data.channels import LAYOUT, channel_unit
-    from ..data.signals import drift_rate, rrmse
-
-    t = measured["time"].values - float(measured["time"][0])
-    t = t[t <= simulated["time"].values[-1]]
-    found: list[Compared] = []
-    if len(t) < 2:
-        return found
-    for name in _COMPARED:
-        if name not in measured or name not in simulated:
-            continue
-        dim = LAYOUT[name].dims[1]
-        recorded = measured[name].transpose("time", dim).values[: len(t)]
-        model = simulated[name].interp(time=t).transpose("time", dim).values
-        ratio, drift = rrmse(recorded, model), drift_rate(model - recorded, float(t[1] - t[0]))
-        apart, peak = np.abs(model - recorded).max(axis=0), np.abs(recorded).max(axis=0)
-        for k, label in enumerate(measured[dim].values):
-            moved = peak[k] > _SILENT * peak.max()
-            numbers = peak[k], apart[k], ratio[k] if moved else math.nan, drift[k]
-            found.append(Compared(f"{name} {label}", channel_unit(f"{name}[{label}]"), *map(float, numbers)))
-    return found
-
-
-def print_comparison(compared: Sequence[Compared]) -> None:
+def print_comparison(compared: "Sequence[Compared]") -> None:
     """Print the differences of a replayed test from the recorded one."""
-    rows = [
-        (
-            *(c.channel, f"{c.peak_recorded:.4g} {c.unit}", f"{c.largest_difference:.3g} {c.unit}"),
-            *(percent(c.rrmse), f"{c.drift:.3g} {c.unit}/s"),
-        )
-        for c in compared
-    ]
-    header = ("channel", "peak recorded", "largest difference", "RRMSE", "drift")
-    print_blocks(Table("Model against record", header, rows))
+    from .report.open_loop_report import comparison_table
+
+    print_blocks(comparison_table(compared))
+
+
+def print_summary(summary: "RunSummary") -> None:
+    """Print verdict, metrics and limits of a run's report."""
+    from .report.run_limits import limit_table
+    from .report.run_report import lead_summary, metrics_table
+
+    moved = [row for row in summary.tracking if row.peak_target]
+    tables = metrics_table(moved, summary.limits), limit_table(summary.limits)
+    print_blocks(Text(summary.verdict, style="bold"), *(table for table in tables if table.rows))
+    print_blocks(lead_summary(moved))
 
 
 def print_run(run: "Run", summary: "RunSummary | None") -> None:
     """Print the summary of a run, its duration, scheme and rate."""
     if summary is not None:
-        from .report.run_limits import limit_table
-        from .report.run_report import lead_summary, metrics_table
-
-        moved = [row for row in summary.tracking if row.peak_target]
-        tables = metrics_table(moved, summary.limits), limit_table(summary.limits)
-        print_blocks(Text(summary.verdict, style="bold"), *(table for table in tables if table.rows))
-        print_blocks(lead_summary(moved))
+        print_summary(summary)
     seconds = run.time[-1] + 1 / run.rate
     print_blocks(f"{seconds:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second")
     if run.coupling is not None:

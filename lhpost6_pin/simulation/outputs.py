@@ -25,7 +25,7 @@ from ..mechanics.specimen_joints import specimen_joints, specimen_positions
 from .simulate import Run
 from .specimen_response import interface_wrench, point_response
 
-__all__ = ["record_of_run"]
+__all__ = ["record_of_run", "reference_channels"]
 
 _OF_POINTS = {
     "displacement": ("m", "displacement of the specimen's points relative to its base"),
@@ -69,11 +69,7 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
     if run.command is not None:
         channels["spool_command"] = run.command
     if reference is not None:
-        channels["reference_displacement"] = reference.displacement
-        for name, values in (("velocity", reference.velocity), ("acceleration", reference.acceleration)):
-            like = LAYOUT[f"platen_{name}"]
-            about = {"units": like.units, "long_name": f"reference {name} of C in {{s}}; Euler angles"}
-            channels[f"reference_{name}"] = (like.dims, values, about)
+        channels |= reference_channels(reference)
     channels |= {name: channels[c.same_as] for name, c in LAYOUT.items() if c.same_as in channels}
     channels |= {"supply_flow": _supply_flow(run)} | _hidden_states(run)
     if machine.accelerometers:
@@ -120,6 +116,16 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
     if valves:
         facts["valves_per_horizontal_actuator"] = int(valves[0])
     return make_record(run.time, channels, labels, {**facts, **attrs})
+
+
+def reference_channels(reference: PlatenMotion) -> dict[str, Any]:
+    """Channels of a target: its displacement, velocity and acceleration."""
+    channels: dict[str, Any] = {"reference_displacement": reference.displacement}
+    for name, values in (("velocity", reference.velocity), ("acceleration", reference.acceleration)):
+        like = LAYOUT[f"platen_{name}"]
+        about = {"units": like.units, "long_name": f"reference {name} of C in {{s}}; Euler angles"}
+        channels[f"reference_{name}"] = (like.dims, values, about)
+    return channels
 
 
 def _supply_droop(run: Run) -> Array:

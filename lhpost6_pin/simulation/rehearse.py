@@ -29,7 +29,7 @@ from .outputs import record_of_run
 from .simulate import ClosedLoop, OpenLoop, PluggedLoop, Run, simulate
 from .trouble import with_pressure_trouble
 
-__all__ = ["SimulatedTest", "loop_for", "rehearse", "replay"]
+__all__ = ["SimulatedTest", "loop_for", "rehearse", "replay", "test_facts"]
 
 
 class SimulatedTest(NamedTuple):
@@ -71,13 +71,18 @@ def rehearse(
     run = with_pressure_trouble(_usable(run))
     motion = (target.displacement, target.velocity, target.acceleration)
     reference = PlatenMotion(*(x[::record_every][: len(run.time)] for x in motion))
-    name = settings.name if isinstance(settings, ControllerSettings) else type(settings).__name__
-    record = record_of_run(run, {"controller": name, **target.reference.facts, **attrs}, reference)
+    record = record_of_run(run, {**test_facts(settings, target), **attrs}, reference)
     if isinstance(settings, ControllerSettings) and isinstance(loop, ClosedLoop) and (drive is not None or inverse):
         name, driven = f"drive_{settings.mode}", loop.drive[::record_every, :6][: len(run.time)]
         about = {"units": LAYOUT[name].units, "long_name": LAYOUT[name].long_name}
         record[name] = (LAYOUT[name].dims, np.array(driven), about)
     return SimulatedTest(run, record)
+
+
+def test_facts(settings: ControllerSettings | UserController, target: Target) -> dict[str, Any]:
+    """Attributes of the record of a test: controller, motion, its scales and source."""
+    name = settings.name if isinstance(settings, ControllerSettings) else type(settings).__name__
+    return {"controller": name, **target.reference.facts}
 
 
 def loop_for(

@@ -39,6 +39,8 @@ log = logging.getLogger(__name__)
 
 _CHUNK = 1024
 """Controller samples between two progress reports."""
+_STOPPED = -3
+"""Status of a run that its `stop` has ended."""
 
 
 @dataclass(frozen=True)
@@ -84,10 +86,12 @@ def simulate(
     progress: Progress | None = None,
     watch: Watch | None = None,
     coupling: CouplingOptions | None = None,
+    stop: Callable[[], bool] | None = None,
 ) -> Run:
     """Run `samples` controller samples and return the motion, every `record_every`-th sample.
 
-    `watch` is called 32 times per second of the run, first at its start. `coupling`: how a coupled specimen is.
+    `watch` is called 32 times per second of the run, first at its start, and `stop` as often: True ends the run there.
+    `coupling`: how a coupled specimen is.
 
     Raises UnknownNameError or SimulationError for an invalid scheme, engine, rate, loop or exchange. A run that stops
     early does not raise: see `Run.trouble`.
@@ -109,7 +113,7 @@ def simulate(
     if status == 0:
         compiled = isinstance(loop, ClosedLoop)
         span = Span(SCHEMES.index(scheme), 0, samples, steps, 1.0 / steps_per_second, compiled, record_every)
-        job = _Job(plant, loop, ws, log_, span, spool, command, progress, watch, coupled)
+        job = _Job(plant, loop, ws, log_, span, spool, command, progress, watch, stop, coupled)
         status, done, more = (_run_fused if engine == "fused" else _run_pinocchio)(job)
         clipped += more
     exchanged = coupled.result() if coupled else None
@@ -174,12 +178,21 @@ class _Job(NamedTuple):
     command: Array  # (samples, n_actuators), closed loop
     progress: Progress | None
     watch: Watch | None
+    stop: Callable[[], bool] | None
     coupled: Coupling | None
 
-    def look(self, sample: int) -> None:
-        """Call the watch, if a snapshot is due."""
-        if self.watch is not None and sample % EVERY == 0:
+    @property
+    def observed(self) -> bool:
+        """Whether it is watched or may be stopped."""
+        return self.watch is not None or self.stop is not None
+
+    def look(self, sample: int) -> bool:
+        """Call the watch, if a snapshot is due; returns whether the run is to end here."""
+        if sample % EVERY:
+            return False
+        if self.watch is not None:
             self.watch(take_snapshot(self.plant, self.ws, sample / SAMPLE_RATE))
+        return self.stop is not None and self.stop()
 
     def report(self, samples: int) -> None:
         """Report progress after a number of samples."""
@@ -203,7 +216,8 @@ def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
         clipped += spools(sample, window)
         if sample % span.every == 0:
             log_packed(sample // span.every, buffer, window, *job.log)
-        job.look(sample)
+        if job.look(sample):
+            return _STOPPED, sample + 1, clipped
         status = advance(ws, window)
         if status:
             return status, sample + 1, clipped
@@ -256,10 +270,11 @@ def _run_fused(job: _Job) -> tuple[int, int, int]:
         control = pack_control(np.zeros(1, AXIS), np.zeros(1, ACTUATOR), none, np.zeros(0, CANCELLER))
         memory = drive = none
     signals = Signals(drive, memory, job.command, job.spool)
-    clipped, chunk, samples = 0, _CHUNK if job.watch is None else EVERY, job.span.last
+    clipped, chunk, samples = 0, EVERY if job.observed else _CHUNK, job.span.last
     for first in range(0, samples, chunk):
         last = min(first + chunk, samples)
-        job.look(first)
+        if job.look(first):
+            return _STOPPED, first, clipped
         span = job.span._replace(first=first, last=last)
         status, done, more = run_fused(span, job.plant.tables, job.ws, control, signals, job.log)
         clipped += more
@@ -278,6 +293,8 @@ def diagnosis(plant: Plant, status: int, time: float, scheme: str, rate: int) ->
             f"stopped at {time:.4f} s: {actuator.name} left its stroke of +-{actuator.stroke:g} m{bumper}; "
             "scale the motion down, look at the controller, or start from the record's own pose and pressures"
         )
+    if status == _STOPPED:
+        return f"stopped at {time:.4f} s: interrupted by a signal; what was done until then is kept"
     hint = "take the scheme semi_implicit" if scheme != "semi_implicit" else "check the drive and the parameters"
     return (
         f"stopped at {time:.4f} s: the run diverged with {scheme} at {rate} steps a second; {hint}, or take more steps "

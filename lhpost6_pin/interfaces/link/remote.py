@@ -1,6 +1,6 @@
 """The virtual 469D, or a user's own controller, in this process and the plant in another: a run over the link."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.ndimage import binary_opening
 
 from ...control.plug import Feedback, start_plugged
 from ...control.valves import valve_counts
@@ -16,11 +17,17 @@ from ...core.errors import LinkError
 from ...core.names import SAMPLE_RATE
 from ...core.progress import Progress
 from ...data.records import make_record
+from ...machine.recorded_specimen import specimen_facts
+from ...mechanics.coupled import BaseMotion
+from ...mechanics.instant import motion_at
 from ...mechanics.plant import Plant
+from ...mechanics.pose import PlatenMotion
+from ...simulation.outputs import reference_channels
 from ...simulation.simulate import ClosedLoop, PluggedLoop, check_closed_loop
 from .client import LinkClient
 from .clock import SECOND, now, undisturbed
 from .protocol import LinkMode, PlantState
+from .served import MISSED_FRAMES
 
 __all__ = ["LinkRun", "record_of_link_run", "run_over_link"]
 
@@ -37,11 +44,29 @@ class LinkRun:
     command: Array  # (n, n_actuators)
     displacement: Array  # (n, n_actuators)
     acceleration: Array  # (n, 6)
+    motion: Sequence[BaseMotion]  # of the platen at C
     force: Array  # (n, n_actuators)
     state: NDArray[np.int8]  # protocol.PlantState
     answered: NDArray[np.bool_]
     tripped: bool
     seconds: float  # from the first command to the last sensors [s]
+
+    @property
+    def trouble(self) -> str | None:
+        """Why the motion is not the controller's: the plant tripped, or went to its safe hold. None where it is."""
+        if self.tripped:
+            at = f"stopped at {len(self.answered) / SAMPLE_RATE:.4f} s: the plant tripped"
+            return f"{at}; an actuator reached the end of its stroke, or the run diverged: see the server"
+        silent = binary_opening(~self.answered, np.ones(MISSED_FRAMES, bool))
+        held = (self.state == PlantState.HOLD) | silent
+        count = int(np.count_nonzero(np.diff(held, prepend=False) & held))
+        if not count:
+            return None
+        holds, first = f"{count} safe hold{'s'[: count != 1]}", float(held.argmax()) / SAMPLE_RATE
+        return (
+            f"lost its commands: {holds}, the first at {first:.4f} s; the motion is not the controller's: take "
+            "lock-step, or a computer that answers 2048 times a second"
+        )
 
 
 def run_over_link(
@@ -60,12 +85,14 @@ def run_over_link(
     rows: dict[str, Array] = {name: np.zeros((samples, plant.spools)) for name in ("command", "displacement", "force")}
     rows |= {"acceleration": np.zeros((samples, 6)), "state": np.zeros(samples, np.int8)}
     answered = np.zeros(samples, np.bool_)
+    moved = [client.reading.motion] * samples
     reading, reported, begin = client.reading, 0, 0
     with undisturbed() if client.mode != LinkMode.LOCK_STEP else nullcontext():
         while reading.sample < samples and reading.state != PlantState.TRIPPED:
             at, sensors = reading.sample, reading.sensors
             rows["command"][at] = command = step(at, sensors)
             rows["acceleration"][at], rows["displacement"][at] = sensors.acceleration, sensors.displacement
+            moved[at] = reading.motion
             rows["force"][at], rows["state"][at], answered[at] = sensors.force, reading.state, True
             begin = begin or now()
             reading = client.exchange(command)
@@ -77,14 +104,24 @@ def run_over_link(
     last = np.maximum.accumulate(np.where(answered, np.arange(samples), 0))[:done]
     tripped = reading.state == PlantState.TRIPPED
     kept: dict[str, Any] = {name: row[last] for name, row in rows.items()}
-    return LinkRun(**kept, answered=answered[:done], tripped=tripped, seconds=seconds)
+    motion = [moved[at] for at in last]
+    return LinkRun(**kept, motion=motion, answered=answered[:done], tripped=tripped, seconds=seconds)
 
 
-def record_of_link_run(run: LinkRun, plant: Plant, attrs: Mapping[str, Any]) -> xr.Dataset:
-    """Record of a run over the link: sensors, commands, and states of the plant."""
+def record_of_link_run(
+    run: LinkRun, plant: Plant, attrs: Mapping[str, Any], reference: PlatenMotion | None = None
+) -> xr.Dataset:
+    """Record of a run over the link: sensors, commands, the platen's motion, and states of the plant.
+
+    reference: target at every sample, if any.
+    """
     states = " ".join(f"{s.value} {s.name.lower()}" for s in PlantState)
     one = "1 if a command answered these sensors"
+    n = len(run.answered)
+    moved = np.array([motion_at(one.pose, one.twist) for one in run.motion]).reshape(n, 2, 6)
     channels: dict[str, Any] = {
+        "platen_displacement": moved[:, 0],
+        "platen_velocity": moved[:, 1],
         "platen_acceleration": run.acceleration,
         "actuator_displacement": run.displacement,
         "actuator_force": run.force,
@@ -95,11 +132,13 @@ def record_of_link_run(run: LinkRun, plant: Plant, attrs: Mapping[str, Any]) -> 
     facts = {
         "kind": "simulated",
         "machine": plant.machine.name,
-        "specimen": plant.machine.specimen.name if plant.machine.specimen else "none",
-        "trouble": "the plant tripped" if run.tripped else "none",
+        **specimen_facts(plant.machine.specimen),
+        "trouble": run.trouble or "none",
     }
-    time = np.arange(len(run.answered)) / SAMPLE_RATE
-    return make_record(time, channels, {"actuator": plant.machine.actuator_names}, {**facts, **attrs})
+    if reference is not None:
+        channels |= reference_channels(PlatenMotion(*(x[:n] for x in reference)))
+    labels = {"actuator": plant.machine.actuator_names}
+    return make_record(np.arange(n) / SAMPLE_RATE, channels, labels, {**facts, **attrs})
 
 
 def _check(client: LinkClient, plant: Plant) -> None:

@@ -34,7 +34,7 @@ from .run_verdict import headlines, verdict_of_run
 from .scales import axis_scale, milliseconds, percent, shown_as
 from .specimen_section import response_blocks
 
-__all__ = ["RunSummary", "lead_summary", "metrics_table", "write_run_report"]
+__all__ = ["RunSummary", "lead_summary", "machine_blocks", "metrics_table", "write_run_report"]
 
 EXPECTED = (
     *(f"platen_{q}" for q in QUANTITIES),
@@ -125,7 +125,7 @@ def write_run_report(
             if found
             else [missing(motion, "Peaks and tracking are not tabulated.")],
         ),
-        Section("assumptions", "Assumptions and sources", _assumptions(list(machine_table or ()))),
+        Section("assumptions", "Assumptions and sources", machine_blocks(list(machine_table or ()))),
         Section("record", "The record", _contents(record)),
     ]
     page = Page(
@@ -196,7 +196,8 @@ def lead_summary(found: Sequence[Tracking]) -> str:
     )
 
 
-def _assumptions(rows: Sequence[Sequence[Any]]) -> list[Block]:
+def machine_blocks(rows: Sequence[Sequence[Any]]) -> list[Block]:
+    """Return the numbers of a machine, assumed ones first, of rows (name, value, unit, source, assumed)."""
     if not rows:
         return ["The numbers of the machine are not available."]
     header = ("Quantity", "Value", "Unit", "Source")

@@ -4,6 +4,7 @@ Commands run in this process through the installed entry point's function; a few
 """
 
 import importlib.metadata
+import json
 import os
 import re
 import signal
@@ -743,3 +744,14 @@ def test_output_into_a_closed_pipe_ends_quietly():
 def test_a_read_only_folder_is_refused(lhpost6, tmp_path):
     (tmp_path / "locked").mkdir(mode=0o500)
     assert refused(lhpost6("run", *COARSE, "--out", "locked/here"), "locked", "Permission denied")
+
+
+@pytest.mark.parametrize("left_out", [("--no-record",), ("--no-report",), ("--no-record", "--no-report")])
+def test_a_run_may_leave_no_record_or_no_report_and_is_judged_all_the_same(lhpost6, tmp_path, left_out):
+    ended = lhpost6("run", *SHORT, *left_out, "--out", "here", "--json")
+    entries = json.loads(ended.out)
+    files = {"record.nc": "--no-record", "report.html": "--no-report"}
+    kept = [name for name, option in files.items() if option not in left_out]
+    assert everything(tmp_path) == [f"here/{name}" for name in kept]
+    assert [Path(path).name for path in entries.get("files", [])] == kept
+    assert entries["level"] in ("good", "attention") and entries["tracking"] and entries["limits"]

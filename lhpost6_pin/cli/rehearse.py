@@ -1,7 +1,7 @@
 """Commands that run the virtual table: run, open-loop, campaign; and the motions that it can run."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -31,6 +31,9 @@ log = logging.getLogger(__name__)
 TEST_FACTS = ("machine", "motion", "scale", "specimen", "effects", "overrides")
 """Attributes of a record that say what was run on what, for `--json`."""
 
+FILES = ("record.nc", "report.html")
+"""What a run leaves."""
+
 __all__ = ["campaign", "motions", "open_loop", "run", "save_run", "write_test_report"]
 
 
@@ -52,6 +55,8 @@ def run(
     ] = False,
     beyond: opt.Beyond = False,
     record_rate: Annotated[int, typer.Option(help="Samples per second of the record, a divisor of 2048.")] = 2048,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Write no record (2 MB a second).")] = False,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Write no report.")] = False,
     json: opt.Json = False,
 ) -> None:
     """Run a motion in closed loop on the virtual table; writes record.nc and report.html.
@@ -80,7 +85,8 @@ def run(
         check_circumstances(str(aic), inverse.made_with, table, chosen.name)
     target = motion.target(table, beyond)
     name = target.reference.motion.replace("/", "_")
-    folder = motion.folder(out, name, "record.nc", "report.html")
+    leave_out = {file for file, no in (("record.nc", no_record), ("report.html", no_report)) if no}
+    folder = motion.folder(out, name, *(file for file in FILES if file not in leave_out))
     given = chosen
     more: list[Path] = []
     if retune:
@@ -110,7 +116,7 @@ def run(
             **options,
         )
     shown = interaction_of(table, given, chosen, inverse)
-    save_run(test, folder, json, interaction=shown, more=more)
+    save_run(test, folder, json, interaction=shown, more=more, leave_out=leave_out)
 
 
 def _canceller(cancel: str | None, target: "Target") -> "Callable[[ClosedLoop | PluggedLoop], ClosedLoop] | None":
@@ -213,10 +219,12 @@ def save_run(
     *,
     interaction: "Interaction | None" = None,
     more: Sequence[Path] = (),
+    leave_out: Collection[str] = (),
 ) -> None:
     """Write the record and the report, a comparison if it is `against` a measured test; print a summary.
 
-    interaction: of table and specimen, for the report; more: files that were written before.
+    interaction: of table and specimen, for the report; more: files that were written before; leave_out: those of
+    `FILES` that are not written.
 
     Raises typer.Exit if the run stopped on the way.
     """
@@ -230,8 +238,10 @@ def save_run(
     from ..simulation.trouble import run_doubts
 
     done, record = test
-    files, summary = [*more, folder / "record.nc", folder / "report.html"], None
-    save_record(record, files[-2])
+    files, summary = [*more, *(folder / file for file in FILES if file not in leave_out)], None
+    path = None if FILES[1] in leave_out else files[-1]
+    if FILES[0] not in leave_out:
+        save_record(record, folder / FILES[0])
     beyond = [*joints_beyond(done.plant, done.time, done.q), *run_doubts(done)]
     for warning in beyond:
         log.warning("%s", warning)
@@ -240,7 +250,7 @@ def save_run(
     notes = [*filter(None, [done.trouble]), *beyond, *doubts]
     entries: dict[str, Any]
     if against is None:
-        summary = write_test_report(done.plant, record, files[-1], notes, interaction=interaction)
+        summary = write_test_report(done.plant, record, path, notes, interaction=interaction)
         entries = {key: record.attrs.get(key) for key in LOOP_FACTS}
     else:
         compared, rows = compare(against, record), machine_rows(done.plant.machine)
@@ -262,9 +272,16 @@ def save_run(
 
 
 def write_test_report(
-    plant: "Plant", record: "xr.Dataset", path: Path, notes: Sequence[str], interaction: "Interaction | None" = None
+    plant: "Plant",
+    record: "xr.Dataset",
+    path: Path | None,
+    notes: Sequence[str],
+    interaction: "Interaction | None" = None,
 ) -> "RunSummary":
-    """Write the report of a test on a plant, with its limits and what its motion demands; returns its summary."""
+    """Write the report of a test on a plant, with its limits and what its motion demands; returns its summary.
+
+    Without a path only the summary is made.
+    """
     from ..mechanics.specimen_joints import specimen_doubts
     from ..show.capacity_tables import judged, performance_loads
     from ..show.report.run_report import write_run_report

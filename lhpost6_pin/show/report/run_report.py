@@ -53,7 +53,7 @@ EXPECTED = (
 class RunSummary:
     """Summary of a run report, for a terminal or another report."""
 
-    path: Path
+    path: Path | None  # None: no page was written
     verdict: str
     level: Level
     headlines: tuple[Headline, ...]
@@ -71,7 +71,7 @@ class RunSummary:
 
 def write_run_report(
     record: xr.Dataset,
-    path: Path | str,
+    path: Path | str | None,
     *,
     limits: Mapping[str, ArrayLike] | None = None,
     notes: Sequence[str] | None = None,
@@ -82,7 +82,7 @@ def write_run_report(
     loads: Sequence[Load] = (),
     fits: str = "",
 ) -> RunSummary:
-    """Write the self-contained HTML report of a test to `path` and return its summary.
+    """Write the self-contained HTML report of a test to `path`, if there is one, and return its summary.
 
     `limits` are capacities by name (`checked_limits`), `notes` warnings of the run, `command` repeats it,
     `machine_table` has rows (name, value, unit, source, assumed), `interaction` is that of table and specimen.
@@ -97,8 +97,13 @@ def write_run_report(
     spools, measures = spool_use(record), motion_measures(record)
     notes = [*(notes or ()), *_gaps(record)]
     uses = [*limit_uses(record, found, spools, bounds), *uses_of_peaks(demands)]
-    paper = performance_blocks(loads, motion_peaks(record), fits, source="the target") if loads else []
     verdict, level = verdict_of_run(record, found, spools, uses, notes)
+    absent = tuple(name for name in EXPECTED if name not in record)
+    lists = tuple(headlines(found, uses)), tuple(found), tuple(spools), tuple(uses), tuple(measures), absent
+    summary = RunSummary(None if path is None else Path(path), verdict, level, *lists)
+    if summary.path is None:
+        return summary
+    paper = performance_blocks(loads, motion_peaks(record), fits, source="the target") if loads else []
     motion = [f"platen_{quantity}" for quantity in QUANTITIES]
     response = response_blocks(record)
     sections = [
@@ -134,14 +139,13 @@ def write_run_report(
         purpose=_purpose(record, found),
         verdict=verdict,
         level=level,
-        headlines=headlines(found, uses),
+        headlines=summary.headlines,
         sections=sections,
         notes=notes,
         command=command,
     )
-    absent = tuple(name for name in EXPECTED if name not in record)
-    lists = tuple(page.headlines), tuple(found), tuple(spools), tuple(uses), tuple(measures), absent
-    return RunSummary(save_page(page, path), verdict, level, *lists)
+    save_page(page, summary.path)
+    return summary
 
 
 def _gaps(record: xr.Dataset) -> list[str]:

@@ -51,7 +51,7 @@ class Parameters(Mapping[str, Quantity]):
     words: Mapping[str, str | int]
     origin: str
     effects: Mapping[str, EffectEntry] = field(default_factory=dict)  # by name
-    replaced: Mapping[str, Quantity | str | int] = field(default_factory=dict)  # what overrides replaced, by path
+    replaced: Mapping[str, Quantity | str | int] = field(default_factory=dict, compare=False)  # by overrides
 
     def __getitem__(self, path: str) -> Quantity:
         """Return the quantity at `path`; raises UnknownNameError that lists the section's paths."""

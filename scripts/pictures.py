@@ -1,4 +1,4 @@
-"""Pictures of the README: the table in motion as the viewer shows it, and the head of a discovery report.
+"""Pictures of README and pages: the table in motion as the viewer shows it, heads of a run and a discovery report.
 
     python scripts/pictures.py [--out scripts/docs/pages/assets] [--results out/pictures]
 
@@ -22,7 +22,7 @@ from lhpost6_pin.data.records import load_record
 
 ROOT = Path(__file__).parents[1]
 AMPLIFY = 2.5
-VIEWER, REPORT = (1280, 640), (1000, 1112)  # width and height of the window [pixels]
+VIEWER, RUN, REPORT = (1280, 760), (1000, 1000), (1000, 1112)  # width and height of the window [pixels]
 NEARER = "viewer.camera.zoom = 1.25; viewer.camera.updateProjectionMatrix(); viewer.set_dirty()"
 
 
@@ -74,6 +74,7 @@ def main() -> None:
     seek = f"viewer.animator.pause(); seek({moment}); part('caption').open = false; {NEARER}"
     for name, page, size, script in (
         ("viewer", run / "view.html", VIEWER, seek),
+        ("report", run / "report.html", RUN, "window.scrollTo(0, 0)"),
         ("discovery", demo / "report.html", REPORT, "window.scrollTo(0, 0)"),
     ):
         path = given.out / f"{name}.png"

@@ -559,7 +559,7 @@ def test_errors_of_sensors_but_those_of_motion_and_parameters_with_a_family_can_
     held = {u.name for u in ready.unknowns if u.kind == "delay" and u.column >= 0}  # less than a sample
     motion = held | {u.name for u in ready.unknowns if u.channel.startswith("platen")}
     assert {u.name for u in ready.unknowns} - motion <= set(released)
-    assert motion and not motion & set(released)  # those are asked of each other
+    assert motion and not motion & set(released)  # redundant sensors are cross-checked
     assert released["gain actuator_force[H2]"] == "pressure_sensor_error"
     assert released["delay spool_position"] == "channel_delay"
     assert released["hydraulics.bulk_modulus"] == "entrained_air"

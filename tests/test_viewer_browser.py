@@ -7,11 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import BROWSER, Tab, browse
+from tornado.websocket import websocket_connect
 
+from lhpost6_pin.core.names import AXES
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.show.bodies import body_name, body_poses, joint_positions
 from lhpost6_pin.show.viewer import LiveView, Look, live_animation, record_frames, show_record, view_apart
+from lhpost6_pin.show.viewer.window import LoopbackWindow
 from lhpost6_pin.simulation.running import RunningPlant
 from lhpost6_pin.simulation.snapshot import EVERY
 
@@ -176,12 +179,61 @@ def test_a_live_view_follows_the_plant(plant, machine, tmp_path, apart):
                 if status.startswith("0.5 s" if not apart else "0."):
                     break
                 await asyncio.sleep(0.05)
-            return tab.faults, status, await tab.evaluate(where)
+            meters = "[...document.querySelectorAll('#meters span')].map((m) => m.textContent)"
+            return tab.faults, status, await tab.evaluate(where), await tab.evaluate(meters)
 
-        faults, status, platen = browse(tmp_path, url, look)
+        faults, status, platen, meters = browse(tmp_path, url, look)
     assert faults == [] and "largest force" in status
+    assert [words.split()[0] for words in meters] == [*AXES, *machine.actuator_names]
     centre = np.array(machine.platen.centre_of_gravity)
     assert np.linalg.norm(platen - centre) > 1e-3  # it has left its place
+
+
+def test_a_live_view_waits_while_it_is_paused(plant, machine, tmp_path):
+    rest = RunningPlant(plant, find_equilibrium(plant)).snapshot()
+    with LiveView(machine, "live") as view:
+        press = "document.getElementById('pause').click()"
+
+        async def look(tab: Tab):
+            while await tab.evaluate("document.getElementById('live').hidden"):
+                await asyncio.to_thread(view.show, rest)
+            await tab.evaluate(press)
+            waiting = asyncio.create_task(asyncio.to_thread(_until_paused, view, rest))
+            await asyncio.sleep(1.0)
+            paused = not waiting.done()
+            await tab.evaluate(press)
+            await asyncio.wait_for(waiting, 60)
+            return tab.faults, paused
+
+        faults, paused = browse(tmp_path, view.url, look)
+    assert faults == [] and paused
+
+
+def _until_paused(view: LiveView, snapshot) -> None:
+    """Show a snapshot again and again until a pause has come, and one after it has ended."""
+    while not view._window.paused.is_set():
+        view.show(snapshot)
+    view.show(snapshot)
+
+
+def test_a_pause_ends_with_the_run_and_with_the_last_viewer(plant, machine):
+    rest = RunningPlant(plant, find_equilibrium(plant)).snapshot()
+    with LiveView(machine, "live", ended=lambda: True) as view:
+        view._window.paused.set()
+        view.show(rest)  # returns
+
+    async def pause_and_leave(window: LoopbackWindow) -> bool:
+        browser = await websocket_connect(window.url.replace("http", "ws") + "commands")
+        await browser.write_message("pause")
+        while not window.paused.is_set():
+            await asyncio.sleep(0.01)
+        browser.close()
+        while window.paused.is_set():
+            await asyncio.sleep(0.01)
+        return True
+
+    with LoopbackWindow("") as window:
+        assert asyncio.run(asyncio.wait_for(pause_and_leave(window), 60))
 
 
 def test_histories_move_with_the_animation_and_show_the_force_of_the_leg_pressed(page, tmp_path):

@@ -42,11 +42,18 @@ class LiveOptions(ViewOptions):
 
 @contextmanager
 def watched(
-    options: LiveOptions, table: "Machine", title: str, *, err: bool = False, apart: bool = False
+    options: LiveOptions,
+    table: "Machine",
+    title: str,
+    *,
+    err: bool = False,
+    apart: bool = False,
+    ended: "Callable[[], bool] | None" = None,
 ) -> "Iterator[Watch | None]":
     """Yield the function that shows a running plant in a browser, or None unless a live view was chosen.
 
-    With `apart` the view runs in another process and delays nothing; else the run waits for a viewer to connect.
+    With `apart` the view runs in another process and delays nothing; else the run waits for a viewer to connect, and
+    while it is paused there, unless `ended`.
     """
     if not options.live:
         yield None
@@ -60,7 +67,7 @@ def watched(
             show_address(url, what, open_it, err)
             yield show
         return
-    with LiveView(table, title, look) as view:
+    with LiveView(table, title, look, ended=ended or (lambda: False)) as view:
         show_address(view.url, what, open_it, err)
         if not view.wait(PATIENCE):
             typer.echo(f"no viewer connected for {PATIENCE:g} s; continuing", err=True)

@@ -97,8 +97,8 @@ def run(
     title = f"{target.reference.title} on {table.name}"
     wait_for(compiling)
     with (
-        watched(view, table, title, err=json) as watch,
         ended_by_signal(view) as stop,
+        watched(view, table, title, err=json, ended=stop) as watch,
         progress_bar(f"{name} on {table.name}") as progress,
     ):
         test = rehearse(

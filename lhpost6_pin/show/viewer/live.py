@@ -2,7 +2,7 @@
 
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -11,7 +11,10 @@ from types import TracebackType
 import numpy as np
 import pinocchio as pin
 
+from ...core.names import AXES
 from ...machine.machine import Machine
+from ...mechanics.plant import make_plant
+from ...simulation.limit_use import plant_limits
 from ...simulation.snapshot import Snapshot, Watch
 from ..bodies import body_name, body_poses, joint_positions, load_bodies
 from ..urdf import legs
@@ -24,18 +27,32 @@ from .window import LoopbackWindow
 
 __all__ = ["LiveView", "view_apart"]
 
+PAUSE = 0.05  # [s] between looks at whether a pause has ended
 MOST_UNSEEN = 8  # snapshots sent and not yet drawn, from which on further ones are dropped
 
 
 class LiveView:
     """A page on this computer that shows a plant as it moves, while used in a ``with`` block.
 
-    Arrows are scaled by the forces at the start: the largest of them is drawn at half the longest length.
+    Arrows are scaled by the forces at the start: the largest of them is drawn at half the longest length. Meters show
+    displacements and actuator forces over their capacities. A browser may pause: with `real_time` the plant waits.
     """
 
-    def __init__(self, machine: Machine, title: str, look: Look = AS_IT_IS, *, real_time: bool = True) -> None:
-        """Prepare the page; with `real_time` motion is no faster than real. Raises ParameterError as `Look.refuse`."""
+    def __init__(
+        self,
+        machine: Machine,
+        title: str,
+        look: Look = AS_IT_IS,
+        *,
+        real_time: bool = True,
+        ended: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Prepare the page; with `real_time` motion is no faster than real, and a pause lasts until `ended` at most.
+
+        Raises ParameterError as `Look.refuse`.
+        """
         look.refuse()
+        self._ended, self._limits = ended, plant_limits(make_plant(machine))
         self._machine, self._look, self._real_time = machine, look, real_time
         self._bodies = load_bodies(machine)
         self._names = [leg.name for leg in legs(machine)]
@@ -73,6 +90,13 @@ class LiveView:
 
     def show(self, snapshot: Snapshot) -> None:
         """Draw one snapshot; returns at once, or in real time when it is due."""
+        if self._window.paused.is_set():
+            if not self._real_time:
+                return  # the plant goes on, its picture rests
+            since = time.monotonic()
+            while self._window.paused.is_set() and not self._ended():
+                time.sleep(PAUSE)
+            self._begin = None if self._begin is None else self._begin + time.monotonic() - since
         if self._begin is None:
             self._begin, self._largest = time.monotonic() - snapshot.time, 2.0 * largest_force(snapshot.force)
             self._still = snapshot.force if self._look.change else self._still
@@ -88,7 +112,18 @@ class LiveView:
             arrow = self._table[f"{name}_rod"]["force"]
             arrow.set_property("scale", size.tolist())
             arrow.set_property("color", [*colour.tolist(), OPACITY])
-        self._window.show_status(f"{snapshot.time:.1f} s, largest force {largest_force(force) / 1e3:,.0f} kN")
+        words = f"{snapshot.time:.1f} s, largest force {largest_force(force) / 1e3:,.0f} kN"
+        self._window.show_state(words, self._meters(snapshot))
+
+    def _meters(self, snapshot: Snapshot) -> dict[str, float]:
+        """Displacements along the axes, and forces of the actuators, over their capacities; without one, none."""
+        push, pull = (self._limits[f"actuator_{way}"] for way in ("force", "pull"))
+        force = snapshot.force[: len(push)]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            forces = force / np.where(force < 0.0, pull, push)
+            displacements = snapshot.displacement / self._limits["displacement"]
+        named = zip([*AXES, *self._machine.actuator_names], [*displacements, *forces], strict=True)
+        return {name: round(float(np.clip(share, -9.99, 9.99)), 3) for name, share in named if not np.isnan(share)}
 
 
 @contextmanager

@@ -83,13 +83,32 @@ document.addEventListener("keydown", (e) => {
   if (way) { animator.pause(); seek(animator.time + way * (e.shiftKey ? 1 : step)); e.preventDefault(); }
   if (e.key === "Home") seek(0);
 });
-if (live) { // what is sent: meshcat's commands, and words on how it goes
+function measure(meters) { // bars from the middle, to either end at the capacity
+  for (const [name, share] of Object.entries(meters)) {
+    const id = `meter-${name}`;
+    if (!part(id)) part("meters").insertAdjacentHTML("beforeend", `<span id="${id}">${name} <b><i></i></b><small></small></span>`);
+    const bar = part(id).querySelector("i"), width = 50 * Math.min(Math.abs(share), 1);
+    bar.style.width = `${width}%`;
+    bar.style.left = `${share < 0 ? 50 - width : 50}%`;
+    bar.className = Math.abs(share) >= 1 ? "over" : Math.abs(share) >= 0.8 ? "near" : "";
+    part(id).querySelector("small").textContent = `${(100 * share).toFixed(0)} %`;
+  }
+}
+if (live) { // what is sent: meshcat's commands, words on how it goes, and demand over capacity
   const socket = new WebSocket(`ws://${location.host}/commands`);
   socket.binaryType = "arraybuffer";
   socket.onmessage = ({ data }) => {
-    if (typeof data === "string") part("status").textContent = data;
-    else viewer.handle_command_bytearray(new Uint8Array(data));
+    if (typeof data !== "string") { viewer.handle_command_bytearray(new Uint8Array(data)); return; }
+    const { status, meters } = JSON.parse(data);
+    part("status").textContent = status;
+    part("live").hidden = false;
+    measure(meters);
   };
+  part("pause").addEventListener("click", () => {
+    const pausing = part("pause").textContent === "Pause";
+    socket.send(pausing ? "pause" : "play");
+    part("pause").textContent = pausing ? "Play" : "Pause";
+  });
   socket.onclose = () => { part("status").textContent += " (ended)"; };
 }
 requestAnimationFrame(draw);

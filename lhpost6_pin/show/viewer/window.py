@@ -6,8 +6,10 @@ process; neither of the two here does. `Recorder` keeps the commands for a page;
 """
 
 import asyncio
+import json
 import socket
 import threading
+from collections.abc import Mapping
 from contextlib import suppress
 from types import TracebackType
 from typing import Any, Protocol
@@ -69,6 +71,7 @@ class LoopbackWindow:
         self._browsers: set[Any] = set()
         self._lock = threading.Lock()
         self._ready, self._connected = threading.Event(), threading.Event()
+        self.paused = threading.Event()  # by a browser, until one plays again or the last one leaves
 
     @property
     def url(self) -> str:
@@ -79,11 +82,12 @@ class LoopbackWindow:
         """Wait until a browser is connected, at most so long [s]; True if one is."""
         return self._connected.wait(seconds)
 
-    def show_status(self, words: str) -> None:
-        """Show words in the status of the connected browsers."""
+    def show_state(self, status: str, meters: Mapping[str, float]) -> None:
+        """Show words, and shares of capacities by name (-1 to 1 is within them), in the connected browsers."""
         with self._lock:
             if self._ready.is_set():
-                self._loop.call_soon_threadsafe(self._hand_out, words)
+                message = json.dumps({"status": status, "meters": meters})
+                self._loop.call_soon_threadsafe(self._hand_out, message)
 
     def send(self, command: Any) -> None:
         """Keep one command for later browsers and send it to those connected."""
@@ -164,10 +168,16 @@ def _application(window: LoopbackWindow) -> Any:
             window._welcome(self)
 
         def on_message(self, message: str | bytes) -> None:
-            """Ignore messages of a browser."""
+            """Pause or play; other messages of a browser are ignored."""
+            if message == "pause":
+                window.paused.set()
+            elif message == "play":
+                window.paused.clear()
 
         def on_close(self) -> None:
             window._browsers.discard(self)
+            if not window._browsers:
+                window.paused.clear()
 
     application = Application()
     application.add_handlers(HOSTS, [(r"/", Page), (r"/commands", Commands)])

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .identification.validation.validate import validate
     from .machine.machine import load_machine
     from .motions import find_motion, make_target
+    from .show.notebook import show_report
     from .show.report.run_report import write_run_report
     from .show.viewer import show_record
     from .simulation.rehearse import rehearse
@@ -40,6 +41,7 @@ __all__ = [
     "rehearse",
     "save_record",
     "show_record",
+    "show_report",
     "validate",
     "write_run_report",
 ]
@@ -58,6 +60,7 @@ _MODULES = {
     "rehearse": "simulation.rehearse",
     "save_record": "data.records",
     "show_record": "show.viewer",
+    "show_report": "show.notebook",
     "validate": "identification.validation.validate",
     "write_run_report": "show.report.run_report",
 }

@@ -1,0 +1,71 @@
+"""The report of any result as a page: as the last line of a notebook's cell it is shown there."""
+
+import tempfile
+from functools import singledispatch
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from ..discovery import Discovery
+from ..identification.calibration import Calibration
+from ..identification.decompose import Decomposed, find_agreement, find_work
+from ..identification.validation import Validation
+from ..simulation.limit_use import plant_limits
+from ..simulation.rehearse import SimulatedTest
+from ..tuning.iterate import Iterated
+from ..tuning.sine import SineTest
+from ..tuning.tune import Tuning
+from .report.calibrate_report import write_calibrate_report
+from .report.decompose_report import write_decompose_report
+from .report.discover_report import write_discover_report
+from .report.iterate_report import write_iterate_report
+from .report.run_report import write_run_report
+from .report.sine_report import write_sine_report
+from .report.tune_report import write_tune_report
+from .report.validate_report import write_validate_report
+from .viewer import Picture
+
+__all__ = ["show_report"]
+
+HEIGHT = 800  # in a notebook [CSS px]
+
+
+def show_report(result: Any) -> Picture:
+    """Return the report of a record, or of the result of a run, a tuning or an analysis.
+
+    Its `save` writes it to one HTML file. Raises TypeError for anything else, and what the report of its kind raises.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "report.html"
+        _write(result, path)
+        return Picture(path.read_text(encoding="utf-8"), HEIGHT)
+
+
+@singledispatch
+def _write(result: Any, path: Path) -> Any:
+    raise TypeError(f"{type(result).__name__} has no report; give a record or the result of an analysis")
+
+
+@_write.register
+def _(result: xr.Dataset, path: Path) -> Any:
+    return write_run_report(result, path)
+
+
+@_write.register
+def _(result: SimulatedTest, path: Path) -> Any:
+    plant, trouble = result.run.plant, result.run.trouble
+    return write_run_report(result.record, path, limits=plant_limits(plant), notes=[trouble] if trouble else [])
+
+
+@_write.register
+def _(result: Decomposed, path: Path) -> Any:
+    return write_decompose_report(result, find_agreement(result), find_work(result), path)
+
+
+_write.register(Calibration, write_calibrate_report)
+_write.register(Validation, write_validate_report)
+_write.register(Discovery, write_discover_report)
+_write.register(Tuning, write_tune_report)
+_write.register(Iterated, write_iterate_report)
+_write.register(SineTest, write_sine_report)

@@ -470,7 +470,7 @@ def test_a_record_is_not_replayed_without_its_specimen_nor_over_itself(lhpost6, 
     save_record(anonymous, tmp_path / "anonymous.nc")
     assert refused(lhpost6("open-loop", tmp_path / "anonymous.nc"), "specimen 'pendulum'", "--specimen")
     replaced = lhpost6("open-loop", record, *mounted, "--out", tmp_path / "made")
-    assert refused(replaced, "would be replaced by its own replay", "--out") and record.read_bytes() == before
+    assert refused(replaced, "would be replaced by its own results", "--out") and record.read_bytes() == before
     ended = lhpost6("open-loop", record, "--out", tmp_path / "two words; and more")  # mounts what the record states
     assert ended.code == 0 and sound(tmp_path / "two words; and more").attrs["specimen"] == "pendulum"
 
@@ -755,3 +755,17 @@ def test_a_run_may_leave_no_record_or_no_report_and_is_judged_all_the_same(lhpos
     assert everything(tmp_path) == [f"here/{name}" for name in kept]
     assert [Path(path).name for path in entries.get("files", [])] == kept
     assert entries["level"] in ("good", "attention") and entries["tracking"] and entries["limits"]
+
+
+def test_a_spectrum_is_not_matched_on_axes_that_are_exchanged(lhpost6, tmp_path):
+    (tmp_path / "design.csv").write_text("period_s,sa_g\n0.1,0.5\n1,0.5\n2,0.2\n")
+    ended = lhpost6("run", "ridgecrest", "--match-spectrum", "design.csv", "--axes", "y=x", "--out", "here")
+    assert refused(ended, "--axes y=x", "--match-spectrum") and everything(tmp_path) == ["design.csv"]
+
+
+def test_a_run_without_a_record_may_stand_beside_the_record_that_it_runs(lhpost6, tmp_path):
+    lhpost6("run", *SHORT, "--out", "here")
+    record = (tmp_path / "here" / "record.nc").read_bytes()
+    assert lhpost6("run", "here/record.nc", "--scale", "0.5", "--no-record", "--out", "here").code == 0
+    assert (tmp_path / "here" / "record.nc").read_bytes() == record
+    assert refused(lhpost6("run", "here/record.nc", "--out", "here"), "would be replaced by its own results")

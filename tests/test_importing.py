@@ -268,6 +268,14 @@ def test_a_matlab_table_may_stand_beside_names_and_units_of_its_channels(tmp_pat
     np.testing.assert_allclose(found.time, TIME, rtol=1e-14)
 
 
+@pytest.mark.parametrize("cells", [[np.arange(3.0), np.arange(2.0)], [np.array(["a", "b"], object), "c"]])
+def test_cells_that_are_no_texts_are_no_names_and_no_damage(tmp_path, cells):
+    labels = np.empty(len(cells), object)
+    labels[:] = cells
+    scipy.io.savemat(tmp_path / "run.mat", {"data": VALUES[:, :2], "time": TIME, "channels": labels})
+    np.testing.assert_array_equal(one(tmp_path / "run.mat").values, VALUES[:, :2])
+
+
 def test_a_unit_that_was_left_empty_leaves_the_others(tmp_path):
     units = np.array([UNITS[0], *[np.zeros(0)] * (len(UNITS) - 1)], object)
     scipy.io.savemat(tmp_path / "run.mat", {"data": VALUES, "chanNames": np.array(NAMES, object), "units": units})

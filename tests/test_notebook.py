@@ -1,28 +1,37 @@
 """Reports of results in a notebook."""
 
+import numpy as np
 import pytest
 from machine_cases import PRACTICE
+from run_cases import driven
 
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.identification.decompose import decompose_record
-from lhpost6_pin.show.notebook import _write, show_report
+from lhpost6_pin.show.notebook import show_report
+from lhpost6_pin.simulation.outputs import record_of_run
+from lhpost6_pin.simulation.rehearse import SimulatedTest
 
 
 def test_a_record_and_its_decomposition_are_shown_as_their_reports(machine, tmp_path):
     record = load_record(PRACTICE).isel(time=slice(0, 4096))
-    for result, kind in (
-        (record, "Run report"),
-        (decompose_record(machine, record, load_sensors("lhpost6")), "Inverse dynamics"),
-    ):
+    decomposed = decompose_record(machine, record, load_sensors("lhpost6"))
+    for result, kind in ((record, "Run report"), (decomposed, "Inverse dynamics")):
         picture = show_report(result)
         assert kind in picture.page and "iframe" in picture._repr_html_()
         picture.save(tmp_path / "page.html")
         assert (tmp_path / "page.html").read_text(encoding="utf-8") == picture.page
 
 
-def test_what_has_no_report_is_refused_and_every_result_has_one():
+def test_a_run_is_judged_in_a_notebook_by_all_that_the_command_judges_by(machine):
+    spool = np.zeros((600, len(machine.actuators)))
+    spool[:, 0] = 0.2  # against the other three: chambers fall below the return pressure
+    run = driven(machine, spool)
+    page = show_report(SimulatedTest(run, record_of_run(run, {"test": "hard"}))).page
+    assert "below the return pressure" in page or "below zero" in page  # a remark on the run
+    assert "Performance curves" in page and "limits.valve_reserve" in page  # its loads and its numbers
+
+
+def test_what_has_no_report_is_refused():
     with pytest.raises(TypeError, match="int has no report"):
         show_report(3)
-    names = {kind.__name__ for kind in _write.registry}
-    assert {"SimulatedTest", "Calibration", "Validation", "Discovery", "Tuning", "Iterated", "SineTest"} <= names

@@ -112,6 +112,17 @@ BAD = {
         rf"\1\nbulk_stiffness = {{ value = 1.0, unit = 'Pa', {ASSUMED}\n",
         "unknown key hydraulics.bulk_stiffness; valid names: bulk_modulus, .*supply_pressure",
     ),
+    "an unknown key of the power supply": (r"^pump_flow = ", "pump_flows = ", "unknown key power_supply.pump_flows"),
+    "a pump flow in kilograms": (
+        r'^(pump_flow = .*unit = )"m3/s"',
+        r'\1"kg"',
+        "power_supply.pump_flow.*'kg'",
+    ),
+    "accumulators below nothing": (
+        r"^(accumulators = \{ value = )36.9",
+        r"\1-36.9",
+        "power_supply.accumulators: -36.9",
+    ),
     "an unknown word in a quantity": (r"^gravity = \{", "gravity = { colour = 'red',", "platen.gravity: unknown col"),
     "an unknown evidence": (r'^(gravity.*)"standard"', r'\1"hearsay"', "platen.gravity: evidence 'hearsay'"),
     "not a number": (r"value = 9.80665", "value = nan", "platen.gravity: value nan is not fin"),

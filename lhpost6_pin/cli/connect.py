@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..core.errors import ParameterError
-from .app import command, print_result, progress_bar, stderr
+from .app import command, print_result, progress_bar, repeating_command, stderr
 from .live_view import LiveOptions, watched
 from .motion_options import MotionOptions
 from .options import (
@@ -19,7 +19,7 @@ from .options import (
     Valves,
     find_controller,
 )
-from .rehearse import write_test_report
+from .results_folder import RUN_FILES, folder_for
 
 __all__ = ["export_fmu", "link", "serve", "serve_specimen"]
 
@@ -119,7 +119,9 @@ def link(
     from ..mechanics.equilibrium import find_equilibrium
     from ..mechanics.plant import make_plant
     from ..mechanics.pose import PlatenMotion
-    from ..show.results import summary_entries
+    from ..mechanics.specimen_joints import specimen_doubts
+    from ..show.results import report_entries
+    from ..show.run_results import write_test_report
     from ..show.tables import print_summary
     from ..simulation.rehearse import loop_for, test_facts
     from ..tuning.cancel import cancelling
@@ -129,7 +131,7 @@ def link(
     target = motion.target(table)
     moved = target.reference.motion
     name = moved.replace("/", "_") + "_link"
-    folder = motion.folder(out, name, "record.nc")
+    folder = folder_for(out, name, *RUN_FILES, inputs=motion.files)
     plant = make_plant(table)
     loop = loop_for(plant, find_equilibrium(plant), chosen, target)
     loop = loop if cancel is None else cancelling(loop, target, cancel)
@@ -141,12 +143,12 @@ def link(
     attrs = {"test": name, "title": f"{target.reference.title} over the link", "link_mode": client.mode.label}
     wanted = PlatenMotion(target.displacement, target.velocity, target.acceleration)
     record = record_of_link_run(done, plant, {**attrs, **test_facts(chosen, target), **counts}, wanted)
-    files = [folder / "record.nc", folder / "report.html"]
+    files = [folder / file for file in RUN_FILES]
     save_record(record, files[0])
-    notes = [*filter(None, [done.trouble])]
+    notes = [*filter(None, [done.trouble]), *specimen_doubts(plant)]
     if counts["unanswered"]:
         notes.append(f"{counts['unanswered']} of {len(done.answered)} samples were not answered in time")
-    summary = write_test_report(plant, record, files[1], notes)
+    summary = write_test_report(plant, record, files[1], notes, command=repeating_command())
     times = {"command to sensors": client.round_trip}
 
     def show() -> None:
@@ -154,7 +156,7 @@ def link(
         print_summary(summary)
 
     outcome = {"tripped": done.tripped, "trouble": done.trouble}
-    print_result(json, lambda: {**link_entries(counts, times), **outcome, **summary_entries(summary)}, show, files)
+    print_result(json, lambda: {**link_entries(counts, times), **outcome, **report_entries(summary)}, show, files)
     if done.trouble:
         stderr().print(f"the run {done.trouble}", markup=False)
         raise typer.Exit(1)

@@ -4,7 +4,7 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from ..machine.machine import Machine
     from ..simulation.snapshot import Watch
 
-__all__ = ["LiveOptions", "NoOpen", "ViewOptions", "ended_by_signal", "show_address", "watched"]
+__all__ = ["EndedBySignal", "LiveOptions", "NoOpen", "ViewOptions", "show_address", "watched"]
 
 NoOpen = Annotated[bool, typer.Option("--no-open", help="Print the address of the page; do not open a browser.")]
 
@@ -74,21 +74,36 @@ def watched(
         yield view.show
 
 
-@contextmanager
-def ended_by_signal(options: LiveOptions) -> "Iterator[Callable[[], bool] | None]":
-    """Yield whether Ctrl-C or SIGTERM has come, which then only ends the run on view; None unless it is viewed live."""
-    if not options.live:
-        yield None
-        return
-    received: list[int] = []
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    for number in before:
-        signal.signal(number, lambda number, _: received.append(number))
-    try:
-        yield lambda: bool(received)
-    finally:
-        for number, handler in before.items():
+class EndedBySignal:
+    """Whether Ctrl-C or SIGTERM has come while in use in a ``with`` block: the first only ends a run on view.
+
+    A second one acts as ever; so does every one of a run that is not on view.
+    """
+
+    def __init__(self, live: bool) -> None:
+        """Watch for signals if the run is on view."""
+        self._numbers = (signal.SIGINT, signal.SIGTERM) if live else ()
+        self._before: dict[int, Any] = {}
+        self._came = False
+
+    def __call__(self) -> bool:
+        """Whether one has come."""
+        return self._came
+
+    def __enter__(self) -> "EndedBySignal":
+        """Begin to watch."""
+        self._before = {number: signal.signal(number, self._end) for number in self._numbers}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let signals act as before."""
+        for number, handler in self._before.items():
             signal.signal(number, handler)
+        self._before = {}
+
+    def _end(self, *_: object) -> None:
+        self._came = True
+        self.__exit__()
 
 
 def show_address(url: str, what: str, open_it: bool, err: bool = False) -> None:

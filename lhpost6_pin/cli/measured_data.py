@@ -32,7 +32,7 @@ def check(
     from ..data.check import check_record
     from ..data.measured_sensors import save_sensors
     from ..data.summary import summarise_records
-    from ..show.check_tables import check_entries, print_check, print_tests, summary_entries
+    from ..show.check_tables import campaign_entries, check_entries, print_check, print_tests
     from ..show.results import finding_entries
     from ..show.tables import print_findings
 
@@ -69,7 +69,7 @@ def check(
             print_check(checked)
 
     def entries() -> dict[str, Any]:
-        summary = summary_entries(summaries)
+        summary = campaign_entries(summaries)
         return {**finding_entries(found), **summary, **check_entries(checked), "skipped": dict(skipped)}
 
     print_result(json, entries, show, written)

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..core.errors import MotionError, RecordError
+from ..core.errors import MotionError
 from ..core.names import SAMPLE_RATE
 from .app import stderr
 from .completion import complete_motion
-from .options import folder_for
 
 if TYPE_CHECKING:
     from ..machine.machine import Machine
@@ -80,6 +79,10 @@ class MotionOptions:
 
         if self.spectrum_damping is not None and self.match_spectrum is None:
             raise MotionError("--spectrum-damping is that of --match-spectrum; give both, or leave it out")
+        if self.match_spectrum is not None and "=" in (self.axes or ""):
+            raise MotionError(
+                f"--axes {self.axes}: --match-spectrum matches each axis to its own spectrum; name axes without ="
+            )
         spectrum = load_spectrum(self.match_spectrum, self.spectrum_damping) if self.match_spectrum else None
         motion = adjust_motion(self._ground(), rotate_by=self.rotate_by, time_scale=self.time_scale)
         if spectrum is not None:
@@ -98,13 +101,10 @@ class MotionOptions:
             check_motion_limits(make_plant(table), target)
         return target
 
-    def folder(self, out: Path | None, name: str, *files: str) -> Path:
-        """Directory for `files` of results; raises RecordError where they would replace a record that is run."""
-        folder = folder_for(out, name, *files)
-        for word in self.motion:
-            if Path(word).resolve() == (folder / "record.nc").resolve():
-                raise RecordError(f"{word} would be replaced by its own run; choose another folder with --out")
-        return folder
+    @property
+    def files(self) -> list[Path]:
+        """Words of the motion as paths: those that are files are what it is made from."""
+        return [Path(word) for word in self.motion]
 
     def _ground(self) -> "GroundMotion":
         """Motion by name, from one file or three component files, or by name from such files."""

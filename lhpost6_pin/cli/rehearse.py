@@ -7,34 +7,30 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..core.errors import ParameterError, RecordError, SimulationError
+from ..core.errors import ParameterError, SimulationError
 from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import complete_motion
-from .live_view import LiveOptions, ended_by_signal, watched
+from .live_view import EndedBySignal, LiveOptions, watched
 from .loop_check import LOOP_FACTS, checked_loop, interaction_of, loop_facts, retuned
 from .motion_options import MotionOptions
+from .results_folder import RUN_FILES
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..mechanics.plant import Plant
     from ..motions import Target
-    from ..show.report.run_report import RunSummary
     from ..simulation.loops import ClosedLoop, PluggedLoop
     from ..simulation.rehearse import SimulatedTest
     from ..tuning.interaction import Interaction
 
 log = logging.getLogger(__name__)
 
-TEST_FACTS = ("machine", "motion", "scale", "specimen", "effects", "overrides")
+TEST_FACTS = ("machine", "motion", "scale", "time_scale", "specimen", "effects", "overrides")
 """Attributes of a record that say what was run on what, for `--json`."""
 
-FILES = ("record.nc", "report.html")
-"""What a run leaves."""
-
-__all__ = ["campaign", "motions", "open_loop", "run", "save_run", "write_test_report"]
+__all__ = ["campaign", "motions", "open_loop", "run", "save_run"]
 
 
 @command()
@@ -86,7 +82,7 @@ def run(
     target = motion.target(table, beyond)
     name = target.reference.motion.replace("/", "_")
     leave_out = {file for file, no in (("record.nc", no_record), ("report.html", no_report)) if no}
-    folder = motion.folder(out, name, *(file for file in FILES if file not in leave_out))
+    folder = opt.folder_for(out, name, *(file for file in RUN_FILES if file not in leave_out), inputs=motion.files)
     given = chosen
     more: list[Path] = []
     if retune:
@@ -96,9 +92,10 @@ def run(
     loop = checked_loop(table, chosen, machine, retune=not retune)
     title = f"{target.reference.title} on {table.name}"
     wait_for(compiling)
+    ended = EndedBySignal(view.live)
     with (
-        ended_by_signal(view) as stop,
-        watched(view, table, title, err=json, ended=stop) as watch,
+        watched(view, table, title, err=json, ended=ended) as watch,
+        ended,
         progress_bar(f"{name} on {table.name}") as progress,
     ):
         test = rehearse(
@@ -112,7 +109,7 @@ def run(
             beyond_limits=True,
             progress=progress,
             watch=watch,
-            stop=stop,
+            stop=ended if view.live else None,
             **options,
         )
     shown = interaction_of(table, given, chosen, inverse)
@@ -146,9 +143,7 @@ def open_loop(
     options = steps.checked(table)
     test = opt.record_name(record, measured.attrs)
     name = f"{test}_open_loop"
-    if ((out or Path("out") / name) / "record.nc").resolve() == record.resolve():
-        raise RecordError(f"{record} would be replaced by its own replay; choose another folder with --out")
-    folder = opt.folder_for(out, name, "record.nc")
+    folder = opt.folder_for(out, name, *RUN_FILES, inputs=[record])
     attrs = {"test": name, "title": f"{test}, open loop", "source": f"spools of {record}"}
     with progress_bar(f"{name} on {table.name}") as progress:
         simulated = replay(table, measured, attrs=attrs, progress=progress, **options)
@@ -173,7 +168,7 @@ def campaign(
     from ..data.campaign import save_campaign
     from ..data.sensors import load_sensors
     from ..data.summary import summarise_records
-    from ..show.check_tables import print_tests, summary_entries
+    from ..show.check_tables import campaign_entries, print_tests
     from ..simulation.simulated_campaign import simulate_campaign
 
     table = machine.load()
@@ -193,7 +188,7 @@ def campaign(
             table, settings, known, seed=seed, errors=errors, tests=chosen, scale=scale, name=name, progress=progress
         )
     files, summaries = save_campaign(made, folder), summarise_records(made.records)
-    entries = {"campaign": name, "tests": [one.test for one in summaries], **summary_entries(summaries)}
+    entries = {"campaign": name, "tests": [one.test for one in summaries], **campaign_entries(summaries)}
     print_result(json, lambda: entries, lambda: print_tests(summaries), files)
 
 
@@ -224,37 +219,31 @@ def save_run(
     """Write the record and the report, a comparison if it is `against` a measured test; print a summary.
 
     interaction: of table and specimen, for the report; more: files that were written before; leave_out: those of
-    `FILES` that are not written.
+    `RUN_FILES` that are not written.
 
     Raises typer.Exit if the run stopped on the way.
     """
     from ..data.records import save_record
     from ..data.replay_comparison import compare
-    from ..mechanics.specimen_joints import joints_beyond
     from ..show.report.open_loop_report import write_open_loop_report
     from ..show.results import run_entries
+    from ..show.run_results import notes_of_run, run_remarks, write_test_report
     from ..show.tables import machine_rows, print_comparison, print_run
-    from ..simulation.coupling import DOUBTFUL
-    from ..simulation.trouble import run_doubts
 
     done, record = test
-    files, summary = [*more, *(folder / file for file in FILES if file not in leave_out)], None
-    path = None if FILES[1] in leave_out else files[-1]
-    if FILES[0] not in leave_out:
-        save_record(record, folder / FILES[0])
-    beyond = [*joints_beyond(done.plant, done.time, done.q), *run_doubts(done)]
-    for warning in beyond:
-        log.warning("%s", warning)
-    exchanged = done.coupling
-    doubts = [exchanged.summary] if exchanged and abs(exchanged.energy_error) > DOUBTFUL else []
-    notes = [*filter(None, [done.trouble]), *beyond, *doubts]
+    files, summary = [*more, *(folder / file for file in RUN_FILES if file not in leave_out)], None
+    path = None if RUN_FILES[1] in leave_out else files[-1]
+    if RUN_FILES[0] not in leave_out:
+        save_record(record, folder / RUN_FILES[0])
+    for remark in run_remarks(done):
+        log.warning("%s", remark)
+    notes, command = notes_of_run(done), repeating_command()
     entries: dict[str, Any]
     if against is None:
-        summary = write_test_report(done.plant, record, path, notes, interaction=interaction)
+        summary = write_test_report(done.plant, record, path, notes, command=command, interaction=interaction)
         entries = {key: record.attrs.get(key) for key in LOOP_FACTS}
     else:
         compared, rows = compare(against, record), machine_rows(done.plant.machine)
-        command = repeating_command()
         verdict, level = write_open_loop_report(
             against, record, compared, files[-1], notes=notes, command=command, machine_table=rows
         )
@@ -269,35 +258,3 @@ def save_run(
     print_result(json, lambda: facts | run_entries(done, summary) | entries, show, files)
     if done.trouble:
         raise typer.Exit(1)
-
-
-def write_test_report(
-    plant: "Plant",
-    record: "xr.Dataset",
-    path: Path | None,
-    notes: Sequence[str],
-    interaction: "Interaction | None" = None,
-) -> "RunSummary":
-    """Write the report of a test on a plant, with its limits and what its motion demands; returns its summary.
-
-    Without a path only the summary is made.
-    """
-    from ..mechanics.specimen_joints import specimen_doubts
-    from ..show.capacity_tables import judged, performance_loads
-    from ..show.report.run_report import write_run_report
-    from ..show.tables import machine_rows
-    from ..simulation.limit_use import plant_limits
-
-    demands, fits = judged(plant, record)
-    return write_run_report(
-        record,
-        path,
-        limits=plant_limits(plant),
-        notes=[*notes, *specimen_doubts(plant)],
-        command=repeating_command(),
-        machine_table=machine_rows(plant.machine),
-        interaction=interaction,
-        demands=demands,
-        loads=performance_loads(plant.machine, payload=False),
-        fits=fits,
-    )

@@ -54,9 +54,9 @@ def paired(measured: xr.Dataset, simulated: xr.Dataset, names: Sequence[str]) ->
 
 def compare(measured: xr.Dataset, simulated: xr.Dataset) -> list[Compared]:
     """Differences of a replayed test from the recorded one by channel, on common samples; empty below two."""
-    step = float(measured["time"][1] - measured["time"][0])
     found = []
     for pair in paired(measured, simulated, _COMPARED):
+        step = float(measured["time"][1] - measured["time"][0])
         apart, peak = np.abs(pair.model - pair.recorded).max(axis=0), np.abs(pair.recorded).max(axis=0)
         ratio, drift = rrmse(pair.recorded, pair.model), drift_rate(pair.model - pair.recorded, step)
         for k, label in enumerate(pair.columns):

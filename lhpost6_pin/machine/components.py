@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from .schema import quantity_field
 
-__all__ = ["Actuator", "Floor", "Hydraulics", "Limits", "Platen", "Strut", "Vec3"]
+__all__ = ["Actuator", "Floor", "Hydraulics", "Limits", "Platen", "PowerSupply", "Strut", "Vec3"]
 
 Vec3 = tuple[float, float, float]
 
@@ -157,3 +157,11 @@ class Limits:
     acceleration: tuple[float, ...] = quantity_field("m/s2 | rad/s2", length=6, bound="nonnegative")
     bandwidth: float = quantity_field("Hz", bound="positive")
     valve_reserve: float = quantity_field("1", bound="fraction")
+
+
+@dataclass(frozen=True)
+class PowerSupply:
+    """Pumps and accumulators behind the supply, as far as they are stated; None where they are not."""
+
+    pump_flow: float | None = quantity_field("m3/s", bound="positive", optional=True)  # of all pumps
+    accumulators: float | None = quantity_field("m3", bound="positive", optional=True)  # their volume

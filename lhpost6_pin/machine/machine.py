@@ -15,7 +15,7 @@ from ..core.user_code import is_python
 from ..effects.effect import Effect
 from ..effects.registry import LAWS
 from .accelerometers import ACCELEROMETER, accelerometers_of
-from .components import Actuator, Floor, Hydraulics, Limits, Platen, Strut, Vec3
+from .components import Actuator, Floor, Hydraulics, Limits, Platen, PowerSupply, Strut, Vec3
 from .library import effect_entry, make_named_effect, size_of
 from .machine_checks import check_actuator, check_machine, check_names
 from .parameters import EffectEntry, Parameters, load_parameters, override_parameters
@@ -276,6 +276,7 @@ def build_machine(
         ),
         accelerometers=accelerometers_of(parameters),
         limits=build_section(Limits, parameters, ("limits",)),
+        power_supply=build_section(PowerSupply, parameters, ("power_supply",)),
         parameters=parameters,
         size=size,
         own_effects=added_effects,

@@ -4,13 +4,13 @@ from dataclasses import fields
 
 from ..core.errors import ParameterError, instead_of
 from ..core.names import AXES
-from .components import Accelerometer, Actuator, Floor, Hydraulics, Limits, Platen, Strut
+from .components import Accelerometer, Actuator, Floor, Hydraulics, Limits, Platen, PowerSupply, Strut
 from .parameters import Parameters
 from .structure import Structure
 
 __all__ = ["check_actuator", "check_machine", "check_names"]
 
-_COMPARISONS = ("estimates", "power_supply", "table_2_2", "table_2_2_payload")
+_COMPARISONS = ("estimates", "table_2_2", "table_2_2_payload")
 """Sections of numbers to compare with; their keys are free."""
 
 
@@ -21,6 +21,7 @@ def check_names(parameters: Parameters, components: list[str], kinds: set[str], 
         "platen": {f.name for f in fields(Platen)},
         "hydraulics": {f.name for f in fields(Hydraulics)},
         "limits": {f.name for f in fields(Limits)},
+        "power_supply": {f.name for f in fields(PowerSupply)},
         "machine": {
             "name",
             "title",
@@ -69,9 +70,8 @@ def check_actuator(actuator: Actuator, origin: str) -> None:
         )
     if actuator.room <= actuator.stroke:
         raise ParameterError(
-            f"{origin}: {actuator.name}: stroke {actuator.stroke:g} m leaves no oil in a chamber of "
-            f"{actuator.room:g} m; "
-            "make the chamber longer or the stroke shorter"
+            f"{origin}: {actuator.kind}.stroke {actuator.stroke:g} m leaves no oil in a chamber of {actuator.name} of "
+            f"{actuator.room:g} m; make the chamber (chamber_a, chamber_b) longer or the stroke shorter"
         )
 
 

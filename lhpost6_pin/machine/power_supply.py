@@ -1,18 +1,17 @@
-"""Pumps and accumulators behind the supply, from section `power_supply` of a machine's file, where it has one."""
+"""What a record states of the pumps and accumulators of its machine."""
+
+from dataclasses import asdict
 
 from .machine import Machine
 
-__all__ = ["NUMBERS", "power_supply"]
-
-NUMBERS = ("pump_flow", "accumulators")
-"""Flow of all pumps [m3/s]; volume of the accumulators [m3]."""
+__all__ = ["power_supply_facts"]
 
 
-def power_supply(machine: Machine) -> dict[str, float | str]:
-    """The numbers stated, and as `NAME_evidence` where each comes from."""
+def power_supply_facts(machine: Machine) -> dict[str, float | str]:
+    """The numbers that are stated, and as `NAME_evidence` where each comes from."""
     found: dict[str, float | str] = {}
-    for name in NUMBERS:
-        if (path := f"power_supply.{name}") in machine.parameters:
-            found[name] = machine.parameters.number(path)
-            found[f"{name}_evidence"] = machine.parameters[path].evidence
+    for name, value in asdict(machine.power_supply).items():
+        if value is not None:
+            evidence = machine.parameters[f"power_supply.{name}"].evidence
+            found |= {name: value, f"{name}_evidence": evidence}
     return found

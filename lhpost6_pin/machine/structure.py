@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from ..core.names import AXES
-from .components import Accelerometer, Actuator, Floor, Hydraulics, Limits, Platen, Strut
+from .components import Accelerometer, Actuator, Floor, Hydraulics, Limits, Platen, PowerSupply, Strut
 from .parameters import Parameters
 
 __all__ = ["BODIES", "ESTIMATES", "FLOW_READINGS", "MOTIONS", "VALVE_PORTS", "Structure"]
@@ -47,6 +47,7 @@ class Structure:
     floors: tuple[Floor, ...]
     accelerometers: tuple[Accelerometer, ...]  # that the acceleration feedback comes from; none: the platen's own
     limits: Limits
+    power_supply: PowerSupply
     parameters: Parameters
     size: tuple[int, ...] | None = field(default=None, compare=False)
     """That families of the library scale with (`library.size_of`); None: its own."""

@@ -113,11 +113,13 @@ def judged_by(found: MachineCapacity) -> str:
     """What accelerations a motion is judged by, and how those that the actuators alone give belong to them."""
     load = found.loads[0 if found.machine.specimen is None else -1]
     bounds = [(one.axis, one.bound("acceleration")) for one in load.axes if one.axis in AXES[:3]]
+    rows = ", ".join(f"“peak acceleration {axis.upper()}”" for axis, _ in bounds)
+    stated = found.machine.parameters["limits.acceleration"].source
+    source = f" The stated limit is limits.acceleration of the machine file ({stated})."
     words = [f"{axis} {b.value:.3g} m/s² ({_shown(b.value, SHOWN['m/s2'])} g, {b.by})" for axis, b in bounds]
     return (
-        "Rows “peak acceleration X”, Y and Z are what the forces of the actuators alone give. A motion is judged "
-        f"by the least of the limits of sinusoidal motion; {load.name}: {', '.join(words)}. The stated limit is "
-        f"limits.acceleration of the machine file: {found.machine.parameters['limits.acceleration'].source}."
+        f"{rows}: what the forces of the actuators alone give. A motion is judged by the least of the limits of "
+        f"sinusoidal motion; {load.name}: {', '.join(words)}." + source * any("stated" in b.by for _, b in bounds)
     )
 
 

@@ -12,7 +12,7 @@ from .report.page import Table
 from .tables import print_sensor_findings
 from .terminal import print_blocks
 
-__all__ = ["check_entries", "print_check", "print_tests", "summary_entries"]
+__all__ = ["check_entries", "print_check", "print_tests", "campaign_entries"]
 
 VERDICTS = {"yes": "yes", "ratio": "partly", "no": "no"}
 
@@ -51,7 +51,7 @@ def print_check(found: CampaignCheck) -> None:
     print_blocks(Table("What these sensors can tell", ("quantity", "", "why"), told))
 
 
-def summary_entries(tests: Sequence[RecordSummary]) -> dict[str, Any]:
+def campaign_entries(tests: Sequence[RecordSummary]) -> dict[str, Any]:
     """Duration, rate, channels and peak motions by test, for `--json`."""
     return {"summary": {one.test: {k: v for k, v in one._asdict().items() if k != "test"} for one in tests}}
 

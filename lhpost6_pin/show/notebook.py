@@ -11,7 +11,6 @@ from ..discovery import Discovery
 from ..identification.calibration import Calibration
 from ..identification.decompose import Decomposed, find_agreement, find_work
 from ..identification.validation import Validation
-from ..simulation.limit_use import plant_limits
 from ..simulation.rehearse import SimulatedTest
 from ..tuning.iterate import Iterated
 from ..tuning.sine import SineTest
@@ -24,6 +23,7 @@ from .report.run_report import write_run_report
 from .report.sine_report import write_sine_report
 from .report.tune_report import write_tune_report
 from .report.validate_report import write_validate_report
+from .run_results import notes_of_run, write_test_report
 from .viewer import Picture
 
 __all__ = ["show_report"]
@@ -54,8 +54,7 @@ def _(result: xr.Dataset, path: Path) -> Any:
 
 @_write.register
 def _(result: SimulatedTest, path: Path) -> Any:
-    plant, trouble = result.run.plant, result.run.trouble
-    return write_run_report(result.record, path, limits=plant_limits(plant), notes=[trouble] if trouble else [])
+    return write_test_report(result.run.plant, result.record, path, notes_of_run(result.run))
 
 
 @_write.register

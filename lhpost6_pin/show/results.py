@@ -31,9 +31,9 @@ __all__ = [
     "iteration_entries",
     "machine_entries",
     "motion_entries",
+    "report_entries",
     "run_entries",
     "sine_entries",
-    "summary_entries",
     "tuning_entries",
 ]
 
@@ -102,10 +102,10 @@ def run_entries(run: "Run", summary: "RunSummary | None") -> Entries:
     if run.coupling is not None:
         stability = _picked(run.coupling.stability, "spectral_radius", "growth")
         entries["interface"] = _picked(run.coupling, "energy", "energy_error") | stability
-    return entries if summary is None else entries | summary_entries(summary)
+    return entries if summary is None else entries | report_entries(summary)
 
 
-def summary_entries(summary: "RunSummary") -> Entries:
+def report_entries(summary: "RunSummary") -> Entries:
     """Verdict, tracking and demand over capacity of a run's report."""
     names = ("axis", "quantity", "peak_target", "peak_achieved", "rrmse", "delay", "rrmse_aligned")
     return {

@@ -13,7 +13,7 @@ from ..data.channels import LAYOUT
 from ..data.records import make_record
 from ..effects.actuator import rod_travels
 from ..effects.supply import drawn_flows
-from ..machine.power_supply import power_supply
+from ..machine.power_supply import power_supply_facts
 from ..machine.recorded_changes import change_facts
 from ..machine.recorded_specimen import specimen_facts
 from ..machine.structure import BODIES
@@ -139,7 +139,7 @@ def _supply_flow(run: Run) -> Any:
     plant, flow = run.plant, np.empty(len(run.time))
     drawn_flows(plant.rows, run.spool, plant.supply._replace(weight=1.0), run.z, flow)
     about = {"units": "m3/s", "long_name": "oil that all valves draw from the supply"}
-    return ("time",), flow, about | power_supply(plant.machine)
+    return ("time",), flow, about | power_supply_facts(plant.machine)
 
 
 def _hidden_states(run: Run) -> dict[str, Any]:

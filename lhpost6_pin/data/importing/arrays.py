@@ -158,6 +158,6 @@ def _texts(tree: Mapping[str, Any], keys: Sequence[str]) -> list[str]:
     for value in (v for wanted in keys for k, v in tree.items() if _OF_CHANNELS.sub("", _word(k)) == wanted):
         cells = [value] if isinstance(value, str) else value if isinstance(value, list | tuple) else np.ravel(value)
         texts = ["" if not isinstance(cell, str) and np.size(cell) == 0 else cell for cell in cells]
-        if any(texts) and all(isinstance(cell, str) for cell in texts):
+        if all(isinstance(cell, str) for cell in texts) and any(texts):
             return [cell.strip() for cell in texts]
     return []

@@ -101,6 +101,8 @@ def _verdict(simulated: xr.Dataset, compared: Sequence[Compared]) -> tuple[str, 
     named = (("platen_displacement", "displacement"), ("actuator_force", "actuator force"))
     worst = [(word, _largest(compared, name)) for name, word in named]
     words = [f"{word} {percent(one.rrmse)} ({_label(one)})" for word, one in worst if one is not None]
+    if not words:
+        return "The model was driven by the recorded spools; neither displacements nor forces are compared.", "plain"
     return f"Driven by the recorded spools, the model differs by an RRMSE of {' and '.join(words)} at most.", "plain"
 
 

@@ -36,7 +36,9 @@ def oil_blocks(record: xr.Dataset) -> list[Block]:
         if np.isfinite(bank):
             name = f"the same over the volume of the accumulators{_assumed(known, 'accumulators')}"
             rows.append((f"{name}, {number(bank)} m³", "", percent(taken / bank)))
-    words = "Flow that all valves draw from the supply, whose pressure the model takes as constant."
+    words = "Flow that all valves draw from the supply."
+    if "supply_pressure" in record and np.ptp(channel(record, "supply_pressure")) == 0.0:
+        words = f"{words[:-1]}, whose pressure the model takes as constant."
     lines = {"pumps": pumps} if np.isfinite(pumps) else {}
     row = Row("Flow", [Trace("drawn by all valves", flow, ACHIEVED)], FLOW, lines)
     table = Table("Oil drawn, pumps and accumulators", ("Quantity", "Unit", "Value"), rows)

@@ -14,6 +14,7 @@ from .completion import completing
 from .loop_check import checked_loop, interaction_of, loop_facts
 from .motion_options import MotionOptions
 from .rehearse import save_run
+from .results_folder import RUN_FILES
 
 __all__ = ["iterate", "replay", "sine", "tune"]
 
@@ -117,7 +118,7 @@ def replay(
             f"{drive} is for reference generators in {found.mode} mode; {settings.name} has {settings.mode} mode"
         )
     name = f"{found.target.reference.motion.replace('/', '_')}_replay"
-    folder = opt.folder_for(out, name, "record.nc", "report.html")
+    folder = opt.folder_for(out, name, *RUN_FILES)
     facts = loop_facts(checked_loop(table, settings, machine), machine)
     attrs = {"test": name, "title": f"{name} on {table.name}", "drive": str(drive), **facts}
     with progress_bar(f"{name} on {table.name}") as progress:

@@ -74,7 +74,7 @@ class MotionOptions:
     def target(self, table: "Machine", beyond: bool = False) -> "Target":
         """Target of the motion at the controller's rate; raises OutOfRangeError beyond the limits, unless allowed."""
         from ..mechanics.plant import make_plant
-        from ..motions import adjust_motion, load_spectrum, make_target, match_spectrum
+        from ..motions import adjust_motion, load_spectrum, make_target
         from ..simulation.motion_limits import check_motion_limits
 
         if self.spectrum_damping is not None and self.match_spectrum is None:
@@ -84,11 +84,16 @@ class MotionOptions:
                 f"--axes {self.axes}: --match-spectrum matches each axis to its own spectrum; name axes without ="
             )
         spectrum = load_spectrum(self.match_spectrum, self.spectrum_damping) if self.match_spectrum else None
-        motion = adjust_motion(self._ground(), rotate_by=self.rotate_by, time_scale=self.time_scale)
-        if spectrum is not None:
-            match = match_spectrum(motion, spectrum, high_pass=self.high_pass, low_pass=self.low_pass)
+        motion, match = adjust_motion(
+            self._ground(),
+            rotate_by=self.rotate_by,
+            time_scale=self.time_scale,
+            spectrum=spectrum,
+            high_pass=self.high_pass,
+            low_pass=self.low_pass,
+        )
+        if match is not None:
             stderr().print(f"{motion.name}: {match.summary}", markup=False, highlight=False)
-            motion = match.motion
         target = make_target(
             motion,
             scale=self.scale,

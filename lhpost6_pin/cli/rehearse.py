@@ -235,9 +235,10 @@ def save_run(
     path = None if RUN_FILES[1] in leave_out else files[-1]
     if RUN_FILES[0] not in leave_out:
         save_record(record, folder / RUN_FILES[0])
-    for remark in run_remarks(done):
+    remarks = run_remarks(done)
+    for remark in remarks:
         log.warning("%s", remark)
-    notes, command = notes_of_run(done), repeating_command()
+    notes, command = notes_of_run(done, remarks), repeating_command()
     entries: dict[str, Any]
     if against is None:
         summary = write_test_report(done.plant, record, path, notes, command=command, interaction=interaction)

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ..core.arrays import Array
+from ..core.names import AXES
 from ..motions.intensity_measures import IntensityMeasures, intensity_measures
 from ..motions.response_spectra import ResponseSpectrum, response_spectrum
 from .metrics import QUANTITIES, SQUARED, channel, commanded_axes, labels, sampling
@@ -20,8 +21,6 @@ DAMPING = 0.05
 
 MOTIONS = {"target": "reference", "achieved": "platen"}
 """Motions of a record, and how the names of their variables begin."""
-
-TRANSLATIONS = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ def _measures_of(record: xr.Dataset, axis: str, step: float, periods: Array) -> 
     for name, prefix in MOTIONS.items():
         names = [f"{prefix}_{quantity}" for quantity in reversed(QUANTITIES)]
         motion = [channel(record, n)[:, place] for n in names if n in record]
-        if axis in TRANSLATIONS and len(motion) == len(names):
+        if axis in AXES[:3] and len(motion) == len(names):
             intensity[name] = intensity_measures(motion[0], motion[1], motion[2], step)
         if names[0] in record and np.isfinite(motion[0]).all() and len(periods):
             spectra[name] = response_spectrum(motion[0], step, periods, DAMPING)

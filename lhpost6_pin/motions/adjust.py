@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core.errors import MotionError
 from .motion import GroundMotion
-from .spectral_match import match_spectrum
+from .spectral_match import SpectrumMatch, match_spectrum
 from .target_spectrum import TargetSpectrum
 
 __all__ = ["adjust_motion", "with_rotation", "with_time_scale"]
@@ -20,8 +20,10 @@ def adjust_motion(
     spectrum: TargetSpectrum | None = None,
     high_pass: float | None = None,
     low_pass: float | None = None,
-) -> GroundMotion:
+) -> tuple[GroundMotion, SpectrumMatch | None]:
     """Motion turned by an angle [deg], then scaled in time, then matched to a spectrum; None leaves a step out.
+
+    With it the match, if there is one.
 
     The corners [Hz] are those with which the target is made. Raises MotionError for what a step cannot do.
     """
@@ -29,9 +31,10 @@ def adjust_motion(
         motion = with_rotation(motion, rotate_by)
     if time_scale is not None:
         motion = with_time_scale(motion, time_scale)
-    if spectrum is not None:
-        motion = match_spectrum(motion, spectrum, high_pass=high_pass, low_pass=low_pass).motion
-    return motion
+    if spectrum is None:
+        return motion, None
+    match = match_spectrum(motion, spectrum, high_pass=high_pass, low_pass=low_pass)
+    return match.motion, match
 
 
 def with_rotation(motion: GroundMotion, angle: float) -> GroundMotion:

@@ -23,7 +23,7 @@ from .report.run_report import write_run_report
 from .report.sine_report import write_sine_report
 from .report.tune_report import write_tune_report
 from .report.validate_report import write_validate_report
-from .run_results import notes_of_run, write_test_report
+from .run_results import notes_of_run, run_remarks, write_test_report
 from .viewer import Picture
 
 __all__ = ["show_report"]
@@ -54,7 +54,7 @@ def _(result: xr.Dataset, path: Path) -> Any:
 
 @_write.register
 def _(result: SimulatedTest, path: Path) -> Any:
-    return write_test_report(result.run.plant, result.record, path, notes_of_run(result.run))
+    return write_test_report(result.run.plant, result.record, path, notes_of_run(result.run, run_remarks(result.run)))
 
 
 @_write.register

@@ -24,11 +24,11 @@ def run_remarks(run: Run) -> list[str]:
     return [*joints_beyond(run.plant, run.time, run.q), *run_doubts(run)]
 
 
-def notes_of_run(run: Run) -> list[str]:
-    """Trouble of a run, remarks on it, and doubts of its exchange with a specimen and of the specimen."""
+def notes_of_run(run: Run, remarks: Sequence[str]) -> list[str]:
+    """Trouble of a run, remarks on it (`run_remarks`), and doubts of its specimen and of the exchange with it."""
     exchange = run.coupling
     doubts = [exchange.summary] if exchange and abs(exchange.energy_error) > DOUBTFUL else []
-    return [*filter(None, [run.trouble]), *run_remarks(run), *doubts, *specimen_doubts(run.plant)]
+    return [*filter(None, [run.trouble]), *remarks, *doubts, *specimen_doubts(run.plant)]
 
 
 def write_test_report(
@@ -42,7 +42,7 @@ def write_test_report(
 ) -> RunSummary:
     """Write the report of a test on a plant, with its limits and what its motion demands; returns its summary.
 
-    Without a path only the summary is made.
+    Without a path only the summary is made, without what the page alone shows.
     """
     demands, fits = judged(plant, record)
     return write_run_report(
@@ -54,6 +54,6 @@ def write_test_report(
         machine_table=machine_rows(plant.machine),
         interaction=interaction,
         demands=demands,
-        loads=performance_loads(plant.machine, payload=False),
+        loads=[] if path is None else performance_loads(plant.machine, payload=False),
         fits=fits,
     )

@@ -162,7 +162,7 @@ def _motion(entry: Mapping[str, Any], folder: Path, source: str) -> tuple[str, P
     if spectrum is None and "spectrum_damping" in entry:
         raise ParameterError(f"{source}: [[motion]]: spectrum_damping is that of match_spectrum; give both")
     corners = {key: entry.get(key) for key in ("high_pass", "low_pass")}
-    motion = adjust_motion(
+    motion, _ = adjust_motion(
         motion_of(entry.get("name"), files, **entry.get("options", {})),
         rotate_by=entry.get("rotate_by"),
         time_scale=entry.get("time_scale"),

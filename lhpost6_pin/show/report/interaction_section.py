@@ -4,6 +4,7 @@ import numpy as np
 import xarray as xr
 
 from ...data.metrics import channel, commanded_axes, labels, sampling
+from ...data.motion_measures import DAMPING
 from ...motions.response_spectra import response_spectrum
 from ...tuning.interaction import Interaction
 from .charts import Curve, Panel, chart_figure, frequency_axis
@@ -13,7 +14,6 @@ from .scales import axis_scale, axis_title, decibels, percent, shown_as
 
 __all__ = ["interaction_blocks", "period_table"]
 
-DAMPING = 0.05
 BAND = (0.1, 40.0)  # [Hz] drawn
 GAINS = (-24.0, 12.0)  # [dB] drawn
 

@@ -16,6 +16,7 @@ import xarray as xr
 
 from ...core.arrays import Array
 from ...data.metrics import channel, commanded_axes, labels, sampling
+from ...data.motion_measures import DAMPING
 from ...mechanics.performance import QUANTITIES, AxisPerformance
 from ...motions.response_spectra import response_spectrum
 from .charts import Curve, Panel, chart_figure, frequency_axis
@@ -26,7 +27,6 @@ from .scales import Scale, axis_scale, axis_title
 __all__ = ["Load", "Peaks", "motion_peaks", "performance_blocks", "performance_table"]
 
 BAND = (0.05, 50.0)  # [Hz]
-DAMPING = 0.05
 ROW_HEIGHT = 330  # [CSS px]
 PAPER_WIDTH = 420  # [CSS px] about, for the tilt of labels
 FREQUENCIES = np.geomspace(*BAND, 121)

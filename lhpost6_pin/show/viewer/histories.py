@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from ...core.arrays import Array
+from ...core.names import AXES
 from ...machine.machine import Machine
 from ..report.plots import CYCLE, envelope
 from ..report.scales import SCALES
@@ -18,8 +19,6 @@ __all__ = ["History", "packed_histories", "record_histories"]
 
 BUCKETS = 500
 """Stretches that a channel is divided into, each drawn by its extremes: about one per pixel of a plot."""
-
-TRANSLATIONS = ("x", "y", "z")
 
 
 class History(NamedTuple):
@@ -38,7 +37,7 @@ def record_histories(machine: Machine, record: xr.Dataset) -> list[History]:
     for quantity in ("displacement", "acceleration"):
         if (name := f"platen_{quantity}") in record:
             scale, values = SCALES[quantity], record[name].transpose("time", "axis").values
-            curves = {a: scale.factor * values[:, axes.index(a)] for a in TRANSLATIONS if a in axes}
+            curves = {a: scale.factor * values[:, axes.index(a)] for a in AXES[:3] if a in axes}
             found.append(History(f"{quantity.capitalize()} of C [{scale.unit}]", time, curves))
     if (force := recorded_forces(machine, record)) is not None:
         names = [leg.name for leg in legs(machine)]

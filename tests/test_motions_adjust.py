@@ -7,7 +7,9 @@ import pytest
 from commands import refused
 
 from lhpost6_pin.core.errors import MotionError
-from lhpost6_pin.data.records import load_record
+from lhpost6_pin.data.motion_measures import motion_measures
+from lhpost6_pin.data.records import load_record, make_record
+from lhpost6_pin.mechanics.pose import PlatenMotion
 from lhpost6_pin.motions import (
     adjust_motion,
     find_motion,
@@ -18,8 +20,10 @@ from lhpost6_pin.motions import (
     response_spectrum,
     spectrum_errors,
     with_rotation,
+    with_scale,
     with_time_scale,
 )
+from lhpost6_pin.simulation.outputs import reference_channels, required_channel
 
 GRAVITY = 9.80665
 DESIGN = "# of a code\nperiod_s,sa_g\n0.03,0.45\n0.12,1.0\n0.6,1.0\n1.0,0.6\n2.0,0.3\n5.0,0.12\n"
@@ -215,3 +219,46 @@ def test_a_run_states_what_its_motion_was_adjusted_by(lhpost6, tmp_path):
     assert refused(lhpost6("run", "sine", "--spectrum-damping", "0.1"), "--match-spectrum; give both")
     assert refused(lhpost6("run", "sine", "--rotate", "30"), "--rotate-by turns any motion")
     assert refused(lhpost6("run", "sine", "--time-scale", "0"), "time scale is 0")
+
+
+# --------------------------------------------------------------------------------------------- required
+def required_of(target):
+    """Required over found spectra at the shorter periods of an axis, of a table at rest but for its target."""
+    reference = PlatenMotion(target.displacement, target.velocity, target.acceleration)
+    names = {f"platen_{name}": getattr(reference, name) for name in ("displacement", "velocity", "acceleration")}
+    record = make_record(target.time, names | reference_channels(reference), {}, {})
+    record["required_spectrum"] = required_channel(target.spectrum)
+    return {one.axis: one for one in motion_measures(record)}
+
+
+def test_the_required_spectrum_of_a_target_stands_beside_its_own(tmp_path):
+    spectrum = load_spectrum(written(tmp_path), 0.02)
+    motion, match = adjust_motion(find_motion("ridgecrest"), spectrum=spectrum)
+    target = with_scale(make_target(motion, scale=0.25, axes="x=y"), 0.5)
+    assert list(target.spectrum.acceleration) == ["x"]  # that of the component that moves it
+    found = required_of(target)["x"]
+    assert found.damping == 0.02
+    required, own = found.spectra["required"], found.spectra["target"]
+    np.testing.assert_allclose(required.pseudo_acceleration, 0.5 * spectrum.at("y", 1 / required.period), rtol=1e-12)
+    at = np.interp(np.log(required.period), np.log(own.period), own.pseudo_acceleration)
+    inside = (1 / required.period > match.band[0]) & (1 / required.period < match.band[1])
+    # as well as it was matched, and 2 % between the periods of the page
+    np.testing.assert_allclose(at[inside], required.pseudo_acceleration[inside], rtol=match.errors["y"] + 0.02)
+
+
+def test_ac156_is_above_its_required_spectrum_less_the_tolerance_in_scaled_time_too():
+    motion = find_motion("ac156")
+    for factor in (1.0, 0.5):
+        scaled = with_time_scale(motion, factor)
+        found = required_of(make_target(scaled, axes="z"))["z"]
+        required, own = found.spectra["required"], found.spectra["target"]
+        at = np.interp(np.log(required.period), np.log(own.period), own.pseudo_acceleration)
+        knees = scaled.spectrum.frequency
+        inside = (1 / required.period > knees[1]) & (1 / required.period < knees[-1])
+        # AC156 allows 10 % below and 30 % above at its own frequencies; a page's lie between them
+        assert (at[inside] > 0.85 * required.pseudo_acceleration[inside]).all()
+        assert (at[inside] < 1.35 * required.pseudo_acceleration[inside]).all()
+
+
+def test_a_turned_motion_has_no_required_spectrum():
+    assert with_rotation(find_motion("ac156"), 30.0).spectrum is None

@@ -8,7 +8,7 @@ from run_cases import driven
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.identification.decompose import decompose_record
-from lhpost6_pin.show.notebook import show_report
+from lhpost6_pin.show.notebook import show_report, show_summary
 from lhpost6_pin.simulation.outputs import record_of_run
 from lhpost6_pin.simulation.rehearse import SimulatedTest
 
@@ -35,3 +35,14 @@ def test_a_run_is_judged_in_a_notebook_by_all_that_the_command_judges_by(machine
 def test_what_has_no_report_is_refused():
     with pytest.raises(TypeError, match="int has no report"):
         show_report(3)
+
+
+def test_a_result_shows_its_report_and_the_head_of_it(machine):
+    decomposed = decompose_record(machine, load_record(PRACTICE).isel(time=slice(0, 4096)), load_sensors("lhpost6"))
+    run = driven(machine, np.zeros((200, len(machine.actuators))))
+    for result in (decomposed, SimulatedTest(run, record_of_run(run, {"test": "rest"}))):
+        page, head = result.plot().page, show_summary(result).page
+        title = page[page.index("<h1>") : page.index("</h1>")]
+        assert title in head and 'class="verdict' in head and 'class="tiles"' in head
+        assert "<script" not in head and len(head) < 0.02 * len(page)  # a notebook keeps it for every cell
+        assert result._repr_html_() == show_summary(result)._repr_html_()

@@ -19,8 +19,8 @@ def test_python_example_runs(tmp_path, monkeypatch):
     code = re.search(r"```python\n(.*?)```", README, re.DOTALL).group(1)
     names: dict[str, object] = {}
     exec(code, names)  # the project's own text
-    assert names["record"].attrs["test"] == "half Ridgecrest"
-    assert names["run"].trouble is None
+    assert names["test"].record.attrs["test"] == "half Ridgecrest"
+    assert names["test"].run.trouble is None
 
 
 def test_it_fits_on_a_few_screens_with_small_pictures():

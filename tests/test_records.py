@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from data_files import LABELS
+from machine_cases import PRACTICE
 
 from lhpost6_pin.core.errors import RecordError, UnknownNameError
 from lhpost6_pin.core.names import AXES
@@ -284,3 +285,16 @@ def test_a_column_is_named_by_its_label() -> None:
     force, pressure = (full_record()[name] for name in ("actuator_force", "supply_pressure"))
     assert (channel_name(force, 4), channel_name(pressure, 0)) == ("actuator_force[V1]", "supply_pressure")
     assert channel_name(force.drop_vars("actuator"), 4) == "actuator_force[4]"
+
+
+def test_a_record_in_single_precision_keeps_time_units_and_seven_figures(tmp_path):
+    record = load_record(PRACTICE).isel(time=slice(0, 500))
+    save_record(record, tmp_path / "whole.nc")
+    save_record(record, tmp_path / "half.nc", single=True)
+    found = load_record(tmp_path / "half.nc")
+    np.testing.assert_array_equal(found["time"].values, record["time"].values)
+    for name, column in record.data_vars.items():
+        assert found[name].attrs == column.attrs
+        np.testing.assert_allclose(found[name].values, column.values, rtol=2**-24)  # half a unit of the last place
+    sizes = [(tmp_path / name).stat().st_size for name in ("half.nc", "whole.nc")]
+    assert sizes[0] < 0.7 * sizes[1]  # half, and what the file says of itself

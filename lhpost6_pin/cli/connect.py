@@ -144,7 +144,7 @@ def link(
     wanted = PlatenMotion(target.displacement, target.velocity, target.acceleration)
     record = record_of_link_run(done, plant, {**attrs, **test_facts(chosen, target), **counts}, wanted)
     files = [folder / file for file in RUN_FILES]
-    save_record(record, files[0])
+    save_record(record, files[0], single=True)
     notes = [*filter(None, [done.trouble]), *specimen_doubts(plant)]
     if counts["unanswered"]:
         notes.append(f"{counts['unanswered']} of {len(done.answered)} samples were not answered in time")

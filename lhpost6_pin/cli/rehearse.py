@@ -51,7 +51,7 @@ def run(
     ] = False,
     beyond: opt.Beyond = False,
     record_rate: Annotated[int, typer.Option(help="Samples per second of the record, a divisor of 2048.")] = 2048,
-    no_record: Annotated[bool, typer.Option("--no-record", help="Write no record (2 MB a second).")] = False,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Write no record (1 MB a second).")] = False,
     no_report: Annotated[bool, typer.Option("--no-report", help="Write no report.")] = False,
     json: opt.Json = False,
 ) -> None:
@@ -234,7 +234,7 @@ def save_run(
     files, summary = [*more, *(folder / file for file in RUN_FILES if file not in leave_out)], None
     path = None if RUN_FILES[1] in leave_out else files[-1]
     if RUN_FILES[0] not in leave_out:
-        save_record(record, folder / RUN_FILES[0])
+        save_record(record, folder / RUN_FILES[0], single=True)
     remarks = run_remarks(done)
     for remark in remarks:
         log.warning("%s", remark)

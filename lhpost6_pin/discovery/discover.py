@@ -12,6 +12,7 @@ from ..control import load_controller
 from ..core.errors import RecordError, UnknownNameError
 from ..core.files import models_folder
 from ..core.progress import Progress, between
+from ..core.shown import Shown
 from ..data.campaign import Campaign, SkippedTest
 from ..data.sensors import SensorSet
 from ..identification.calibration import calibration_numbers, usable_tests
@@ -51,7 +52,7 @@ FEWEST = 3  # tests that are searched; with more, one is held out
 
 
 @dataclass(frozen=True)
-class Discovery:
+class Discovery(Shown):
     """Result of a search for missing effects."""
 
     campaign: str

@@ -21,7 +21,8 @@ from .process import Reference, Target, make_target, smooth_step, with_scale
 from .readers import load_motion
 from .response_spectra import ResponseSpectrum, response_spectrum
 from .spectral_match import SpectrumMatch, match_spectrum, spectrum_errors
-from .target_spectrum import TargetSpectrum, load_spectrum
+from .spectrum_file import load_spectrum
+from .target_spectrum import TargetSpectrum
 
 __all__ = [
     "AXES",

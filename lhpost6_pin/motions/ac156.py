@@ -8,6 +8,7 @@ A_FLX, holds, and falls to A_RIG. Horizontal: A_FLX = S_DS (1 + 2 z/h) <= 1.6 S_
 
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from .motion import GroundMotion, make_motion
 from .process import smooth_step
 from .response_spectra import response_spectrum
 from .spectral_match import rounded_peaks
+from .target_spectrum import TargetSpectrum
 
 __all__ = ["ac156", "required_spectrum"]
 
@@ -103,7 +105,12 @@ def ac156(*, name: str, **numbers: Any) -> GroundMotion:
                 np.exp(deviation),
             )
     source = f"ICC-ES AC156 spectrum, S_DS {n.sds:.4g} m/s^2, z/h {n.height_ratio:g}, seed {n.seed}"
-    return make_motion(name, n.time_step, channels, "acceleration", source)
+    motion = make_motion(name, n.time_step, channels, "acceleration", source)
+    required = {
+        axis: required_spectrum(np.array(n.knees), *level, n.knees, n.lowest_ratio)
+        for axis, level in zip(channels, levels, strict=True)
+    }
+    return replace(motion, spectrum=TargetSpectrum(np.array(n.knees), required, n.damping, "ICC-ES AC156"))
 
 
 def _matched_noise(

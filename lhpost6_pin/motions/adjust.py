@@ -40,6 +40,8 @@ def adjust_motion(
 def with_rotation(motion: GroundMotion, angle: float) -> GroundMotion:
     """Motion whose horizontal components are turned by `angle` [deg] about the vertical, from x towards y.
 
+    It has no spectrum to which it was made.
+
     Raises MotionError for an angle that is not finite, or a motion without horizontal components or with roll or pitch.
     """
     if not np.isfinite(angle):
@@ -50,7 +52,8 @@ def with_rotation(motion: GroundMotion, angle: float) -> GroundMotion:
     cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     samples = motion.samples.copy()
     samples[:, :2] = samples[:, :2] @ np.array([[cosine, sine], [-sine, cosine]])
-    return replace(motion, samples=samples, source=f"{motion.source}; turned by {angle:g} deg from x towards y")
+    source = f"{motion.source}; turned by {angle:g} deg from x towards y"
+    return replace(motion, samples=samples, source=source, spectrum=None)
 
 
 def with_time_scale(motion: GroundMotion, factor: float) -> GroundMotion:
@@ -70,4 +73,5 @@ def with_time_scale(motion: GroundMotion, factor: float) -> GroundMotion:
         samples=motion.samples * factor ** np.repeat(np.array(powers, dtype=float), 3),
         source=f"{motion.source}; time scale {factor:g}",
         time_scale=factor * motion.time_scale,
+        spectrum=motion.spectrum and motion.spectrum.with_time_scale(factor),
     )

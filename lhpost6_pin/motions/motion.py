@@ -7,6 +7,7 @@ import numpy as np
 
 from ..core.errors import MotionError
 from ..core.names import AXES
+from .target_spectrum import TargetSpectrum
 
 __all__ = ["AXES", "QUANTITIES", "GroundMotion", "make_motion"]
 
@@ -32,6 +33,7 @@ class GroundMotion:
     quantity: str  # one of QUANTITIES
     source: str
     time_scale: float = 1.0  # its duration over that of the recorded motion
+    spectrum: TargetSpectrum | None = None  # to which it was made or matched
 
     def __post_init__(self) -> None:
         """Check quantity, time step and samples."""

@@ -18,6 +18,7 @@ import numpy as np
 from ..core.errors import MotionError
 from ..core.files import models_folder
 from .motion import AXES, GroundMotion
+from .target_spectrum import TargetSpectrum
 from .toml import load_toml, values_of
 
 __all__ = ["Reference", "Target", "axes_map", "make_target", "processing", "smooth_step", "with_scale"]
@@ -60,6 +61,7 @@ class Target:
     velocity: np.ndarray  # (n, 6) [m/s, rad/s]
     acceleration: np.ndarray  # (n, 6) [m/s^2, rad/s^2]
     reference: Reference
+    spectrum: TargetSpectrum | None = None  # that it is to have, by axis of the table
 
     @property
     def time_step(self) -> float:
@@ -180,14 +182,16 @@ def make_target(
     _refuse_infinite(motion.name, scale, displacement, velocity, acceleration)
     start = first * motion.time_step - lead / rate
     reference = Reference(motion.name, motion.source, scale, pairs, high_pass, low_pass, start, motion.time_scale)
-    return Target(np.arange(count) / rate, displacement, velocity, acceleration, reference)
+    spectrum = motion.spectrum and motion.spectrum.on_axes(pairs, scale)
+    return Target(np.arange(count) / rate, displacement, velocity, acceleration, reference, spectrum)
 
 
 def with_scale(target: Target, scale: float) -> Target:
     """Copy of a target at another `scale` of its motion (the processing is linear)."""
     factor = scale / target.reference.scale
     rows = {key: factor * getattr(target, key) for key in ("displacement", "velocity", "acceleration")}
-    return replace(target, reference=replace(target.reference, scale=scale), **rows)
+    spectrum = target.spectrum and target.spectrum.on_axes(((a, a) for a in target.spectrum.acceleration), factor)
+    return replace(target, reference=replace(target.reference, scale=scale), spectrum=spectrum, **rows)
 
 
 def smooth_step(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

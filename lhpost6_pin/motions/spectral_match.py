@@ -17,6 +17,7 @@ from ..core.errors import MotionError
 from .motion import AXES, GroundMotion
 from .process import Target, make_target, processing
 from .response_spectra import response_spectrum
+from .spectrum_file import EXAMPLE
 from .target_spectrum import TargetSpectrum
 
 __all__ = ["SpectrumMatch", "match_spectrum", "rounded_peaks", "spectrum_errors"]
@@ -52,7 +53,7 @@ def match_spectrum(
     from scipy.fft import next_fast_len
 
     numbers = processing()
-    axes = spectrum.axes_of(motion)
+    axes = _axes(motion, spectrum)
     target_of = partial(make_target, axes=",".join(axes), high_pass=high_pass, low_pass=low_pass)
     first = target_of(motion)
     band = _band(motion, spectrum, first)
@@ -92,7 +93,8 @@ def match_spectrum(
             "--high-pass",
             *(motion.name, 100 * numbers["match_tolerance"], 100 * max(errors.values())),
         )
-    return SpectrumMatch(replace(matched, source=f"{motion.source}; {text}"), band, errors, text)
+    matched = replace(matched, source=f"{motion.source}; {text}", spectrum=spectrum)
+    return SpectrumMatch(matched, band, errors, text)
 
 
 def rounded_peaks(samples: np.ndarray, level: float) -> np.ndarray:
@@ -108,6 +110,17 @@ def spectrum_errors(target: Target, spectrum: TargetSpectrum, band: tuple[float,
     moved = [axis for axis, _ in target.reference.axes if axis in spectrum.acceleration]
     frequency = _frequencies(band, spectrum.damping / 2)
     return {axis: float(np.abs(_ratio(target, spectrum, axis, frequency) - 1).max()) for axis in moved}
+
+
+def _axes(motion: GroundMotion, spectrum: TargetSpectrum) -> tuple[str, ...]:
+    """Axes of a motion that have a spectrum."""
+    found = tuple(axis for axis in motion.axes if axis in spectrum.acceleration)
+    if not found:
+        raise MotionError(
+            f"{spectrum.source}: has a spectrum for {', '.join(spectrum.acceleration)}, {motion.name} moves "
+            f"{', '.join(motion.axes) or 'in no axis'}; {EXAMPLE}"
+        )
+    return found
 
 
 def _band(motion: GroundMotion, spectrum: TargetSpectrum, target: Target) -> tuple[float, float]:

@@ -19,6 +19,7 @@ from .report.calibrate_report import write_calibrate_report
 from .report.decompose_report import write_decompose_report
 from .report.discover_report import write_discover_report
 from .report.iterate_report import write_iterate_report
+from .report.page import summary_only
 from .report.run_report import write_run_report
 from .report.sine_report import write_sine_report
 from .report.tune_report import write_tune_report
@@ -26,9 +27,10 @@ from .report.validate_report import write_validate_report
 from .run_results import notes_of_run, run_remarks, write_test_report
 from .viewer import Picture
 
-__all__ = ["show_report"]
+__all__ = ["show_report", "show_summary"]
 
 HEIGHT = 800  # in a notebook [CSS px]
+SUMMARY_HEIGHT = 420  # of a summary [CSS px]
 
 
 def show_report(result: Any) -> Picture:
@@ -36,10 +38,19 @@ def show_report(result: Any) -> Picture:
 
     Its `save` writes it to one HTML file. Raises TypeError for anything else, and what the report of its kind raises.
     """
+    return Picture(_page(result), HEIGHT)
+
+
+def show_summary(result: Any) -> Picture:
+    """Return the head of the report of a result: verdict, key figures and remarks. Raises as `show_report`."""
+    return Picture(summary_only(_page(result)), SUMMARY_HEIGHT)
+
+
+def _page(result: Any) -> str:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "report.html"
         _write(result, path)
-        return Picture(path.read_text(encoding="utf-8"), HEIGHT)
+        return path.read_text(encoding="utf-8")
 
 
 @singledispatch

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from ..core.arrays import Array
+from ..core.names import AXES
 from ..data.accelerometers import accelerometer_channel, accelerometer_signals
 from ..data.alignment import oil_force
 from ..data.channels import LAYOUT
@@ -22,10 +23,11 @@ from ..mechanics.gas_pressure import gas_ratio, strut_pressures
 from ..mechanics.interface_wrench import INTERFACE_AXES, interface_lever
 from ..mechanics.pose import PlatenMotion, leg_displacements, platen_motion
 from ..mechanics.specimen_joints import specimen_joints, specimen_positions
+from ..motions import TargetSpectrum
 from .simulate import Run
 from .specimen_response import interface_wrench, point_response
 
-__all__ = ["record_of_run", "reference_channels"]
+__all__ = ["record_of_run", "reference_channels", "required_channel"]
 
 _OF_POINTS = {
     "displacement": ("m", "displacement of the specimen's points relative to its base"),
@@ -126,6 +128,22 @@ def reference_channels(reference: PlatenMotion) -> dict[str, Any]:
         about = {"units": like.units, "long_name": f"reference {name} of C in {{s}}; Euler angles"}
         channels[f"reference_{name}"] = (like.dims, values, about)
     return channels
+
+
+def required_channel(spectrum: TargetSpectrum) -> xr.DataArray:
+    """Response spectrum that a target was to have: not-a-number for axes without one."""
+    columns = [spectrum.acceleration.get(axis, np.full(len(spectrum.frequency), np.nan)) for axis in AXES]
+    return xr.DataArray(
+        np.column_stack(columns),
+        {"required_frequency": ("required_frequency", spectrum.frequency, {"units": "Hz"}), "axis": list(AXES)},
+        ("required_frequency", "axis"),
+        attrs={
+            "units": "m/s2",
+            "long_name": "response spectrum (pseudo-acceleration) that the target was to have",
+            "damping": spectrum.damping,
+            "source": spectrum.source,
+        },
+    )
 
 
 def _supply_droop(run: Run) -> Array:

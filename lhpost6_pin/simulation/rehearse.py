@@ -15,6 +15,7 @@ from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..core.names import SAMPLE_RATE
 from ..core.progress import Progress
+from ..core.shown import plot_of, summary_of
 from ..data.channels import LAYOUT
 from ..data.records import require
 from ..data.signals import resample_band_limited
@@ -25,7 +26,7 @@ from ..mechanics.plant import Plant, State, make_plant
 from ..mechanics.pose import PlatenMotion
 from ..motions import Target
 from .motion_limits import check_motion_limits
-from .outputs import record_of_run
+from .outputs import record_of_run, required_channel
 from .simulate import ClosedLoop, OpenLoop, PluggedLoop, Run, simulate
 from .trouble import with_pressure_trouble
 
@@ -37,6 +38,13 @@ class SimulatedTest(NamedTuple):
 
     run: Run
     record: xr.Dataset
+
+    def plot(self) -> Any:
+        """Return the report, as `plot_of`."""
+        return plot_of(self)
+
+    def _repr_html_(self) -> str:
+        return summary_of(self)
 
 
 def rehearse(
@@ -72,6 +80,8 @@ def rehearse(
     motion = (target.displacement, target.velocity, target.acceleration)
     reference = PlatenMotion(*(x[::record_every][: len(run.time)] for x in motion))
     record = record_of_run(run, {**test_facts(settings, target), **attrs}, reference)
+    if target.spectrum is not None:
+        record["required_spectrum"] = required_channel(target.spectrum)
     if isinstance(settings, ControllerSettings) and isinstance(loop, ClosedLoop) and (drive is not None or inverse):
         name, driven = f"drive_{settings.mode}", loop.drive[::record_every, :6][: len(run.time)]
         about = {"units": LAYOUT[name].units, "long_name": LAYOUT[name].long_name}

@@ -124,7 +124,7 @@ def load_drive(path: Path | str) -> Drive:
     if not uniform:
         raise RecordError(f"{path}: its samples are not those of the controller, {SAMPLE_RATE} Hz; make the file again")
     motion = {quantity: arrays[f"wanted_{quantity}"] for quantity in _UNITS}
-    target = Target(time=time, **motion, reference=reference)
+    target = Target(time, motion["displacement"], motion["velocity"], motion["acceleration"], reference)
     return Drive(arrays["drive"], mode, target, dict(data.attrs))
 
 

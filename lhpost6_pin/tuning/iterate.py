@@ -21,6 +21,7 @@ from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..core.names import AXES, SAMPLE_RATE
 from ..core.progress import Progress
+from ..core.shown import Shown
 from ..data.signals import align, delay, lowpass_zero_phase, rrmse
 from ..data.transfer import Transfer, delay_of
 from ..machine.machine import Machine
@@ -57,7 +58,7 @@ class Iteration(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Iterated:
+class Iterated(Shown):
     """History of an iteration, and its best drive."""
 
     settings: ControllerSettings

@@ -22,6 +22,7 @@ from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..core.names import AXES, SAMPLE_RATE
 from ..core.progress import Progress
+from ..core.shown import Shown
 from ..data.distortion import Harmonics, harmonics, phase_between, total_harmonic_distortion
 from ..machine.machine import Machine
 from ..mechanics.plant import Plant
@@ -50,7 +51,7 @@ class SineResult:
 
 
 @dataclass(frozen=True)
-class SineTest:
+class SineTest(Shown):
     """A sine reproduced by the three-variable controller alone, and with APC and AHC."""
 
     settings: ControllerSettings

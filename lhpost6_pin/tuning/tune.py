@@ -22,6 +22,7 @@ from ..core.arrays import Complex
 from ..core.errors import SimulationError
 from ..core.names import AXES, SAMPLE_RATE
 from ..core.progress import Progress
+from ..core.shown import Shown
 from ..data.transfer import Transfer, band_within, delay_of
 from ..machine.machine import Machine
 from ..mechanics.equilibrium import find_equilibrium
@@ -64,7 +65,7 @@ class AxisTuning:
 
 
 @dataclass(frozen=True)
-class Tuning:
+class Tuning(Shown):
     """Result of a tuning: settings, the steps to them, and every axis before and after."""
 
     machine: Machine

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...core.arrays import Array, Mask
 from ...core.files import models_folder
+from ...core.shown import Shown
 from ...data.campaign import SkippedTest
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
@@ -40,7 +41,7 @@ class Subset(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Calibration:
+class Calibration(Shown):
     """Result of a calibration; p unknowns: parameters, then sensor errors."""
 
     machine: Machine

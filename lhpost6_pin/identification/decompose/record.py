@@ -15,6 +15,7 @@ import xarray as xr
 from ...core.arrays import Array
 from ...core.errors import RecordError
 from ...core.files import models_folder
+from ...core.shown import Shown
 from ...data.alignment import Delay, align_record
 from ...data.channels import MOTION
 from ...data.measured_sensors import find_sensors
@@ -49,7 +50,7 @@ class ComparisonBand(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Decomposed:
+class Decomposed(Shown):
     """A decomposed record: `whole` has all samples in the sensors' band, `forces` and `motion` the compared ones."""
 
     test: MeasuredTest  # aligned, if it was; its motion is in the sensors' band

@@ -20,6 +20,7 @@ from ...core.errors import LhpostError, RecordError
 from ...core.files import write_whole
 from ...core.jsonable import as_json
 from ...core.progress import Progress
+from ...core.shown import Shown
 from ...data.alignment import Delay, align_record
 from ...data.campaign import Campaign
 from ...data.measured_sensors import find_sensors
@@ -45,7 +46,7 @@ _UNITS = {
 
 
 @dataclass(frozen=True)
-class Validation:
+class Validation(Shown):
     """Result of a validation: each phase of each test."""
 
     campaign: str

@@ -2,17 +2,17 @@
 
 from collections.abc import Sequence
 
-from ...data.motion_measures import DAMPING, PERIODS, MotionMeasures
+from ...data.motion_measures import MOTIONS, PERIODS, MotionMeasures
 from ...motions.intensity_measures import IntensityMeasures
 from .charts import Curve, Panel, XAxis, chart_figure
 from .page import Block, Figure, Table, details, missing, number
-from .plots import ACHIEVED, TARGET
+from .plots import ACHIEVED, SUPPLY, TARGET
 from .scales import SCALES, axis_scale, axis_title, percent
 
 __all__ = ["PERIOD_AXIS", "intensity_table", "spectrum_blocks"]
 
 PERIOD_AXIS = XAxis("Period [s]", log=True, ticks=(0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10))
-LINES = {"target": TARGET, "achieved": ACHIEVED}
+LINES = {"target": TARGET, "achieved": ACHIEVED, "required": SUPPLY}
 WORDS = (
     "Peak ground acceleration, velocity and displacement (PGA, PGV, PGD); Arias intensity π/(2g) ∫ a² dt; significant "
     "duration, in which it grows from 5 to 95 %; cumulative absolute velocity (CAV) ∫ |a| dt. Spectrum error: RMS of "
@@ -24,10 +24,10 @@ FOLDED_HEIGHT = 200  # [CSS px]
 
 def spectrum_blocks(measures: Sequence[MotionMeasures]) -> list[Block]:
     """Return intensity measures and response spectra of target and achieved motion of the commanded axes."""
-    lacking = [name for name in LINES if not any(name in one.spectra for one in measures)]
-    absent = [{"target": "reference_acceleration", "achieved": "platen_acceleration"}[name] for name in lacking]
+    lacking = [name for name in MOTIONS if not any(name in one.spectra for one in measures)]
+    absent = [f"{MOTIONS[name]}_acceleration" for name in lacking]
     blocks: list[Block] = [missing(absent, "Their response spectra are not drawn.")] if absent else []
-    if len(absent) == len(LINES):
+    if len(absent) == len(MOTIONS):
         return blocks
     if any(one.intensity for one in measures):
         blocks += [WORDS, intensity_table(measures)]
@@ -52,9 +52,10 @@ def _cells(values: IntensityMeasures) -> list[str]:
 
 def _axis_blocks(one: MotionMeasures) -> list[Block]:
     """Return the pseudo-acceleration spectra of an axis; those of velocity and displacement are folded."""
-    words = f"Pseudo-spectral acceleration (PSA), {number(100 * DAMPING, 1)} % damping."
+    words = f"Pseudo-spectral acceleration (PSA), {number(100 * one.damping, 1)} % damping."
     if one.spectrum_error == one.spectrum_error:
         words += f" Spectrum error {percent(one.spectrum_error)}."
+    words += " Dashed: the required response spectrum." * ("required" in one.spectra)
     folded = (_panel(one, "velocity", "PSV"), _panel(one, "displacement", "SD"))
     more = "Pseudo-spectral velocity (PSV) and spectral displacement (SD)"
     return [

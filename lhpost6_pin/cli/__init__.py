@@ -4,8 +4,8 @@ Exit codes: 0 done, 1 a run stopped on the way or a check found errors, 2 the in
 read or written, 130 interrupted.
 """
 
-from . import connect, control, discover, ensemble, import_data, look, measured_data, new_machine, rehearse
+from . import connect, control, discover, ensemble, import_data, look, measured_data, new_machine, panel, rehearse
 from .app import app, main, run_script
 
-__all__ = ["app", "connect", "control", "discover", "ensemble", "import_data", "look", "main", "measured_data"]
+__all__ = ["app", "connect", "control", "discover", "ensemble", "import_data", "look", "main", "measured_data", "panel"]
 __all__ += ["new_machine", "rehearse", "run_script"]

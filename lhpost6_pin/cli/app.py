@@ -28,7 +28,7 @@ __all__ += ["run_script", "stderr"]
 
 JOBS: Mapping[str, tuple[str, ...]] = {
     "Rehearse": ("run", "open-loop", "campaign", "ensemble", "motions"),
-    "Control": ("tune", "iterate", "replay", "sine"),
+    "Control": ("tune", "iterate", "replay", "sine", "panel"),
     "Measured data": ("import", "check", "export", "decompose", "validate", "calibrate"),
     "Discover": ("discover", "demo"),
     "Connect": ("serve", "link", "serve-specimen", "export-fmu"),

@@ -16,7 +16,20 @@ from ..mechanics.plant import Plant, make_plant
 from ..mechanics.pose import kinematic_jacobian
 from ..mechanics.rigid_body import platen_inertia
 from .filters import drive_for, feedback_generator, notch_section, reference_generator
-from .loop import ACTUATOR, AXIS, CANCELLER, MEMORY_ROWS, ControlTables, Feedback, control_step, pack_control
+from .loop import (
+    ACTUATOR,
+    AXIS,
+    CANCELLER,
+    FEEDBACK,
+    FORCE,
+    GENERATOR,
+    MEMORY_ROWS,
+    POSE,
+    ControlTables,
+    Feedback,
+    control_step,
+    pack_control,
+)
 from .plug import Wanted
 from .settings import ControllerSettings
 
@@ -48,6 +61,21 @@ class Controller(NamedTuple):
     def init(self) -> Array:
         """The controller's memory at rest, for one run."""
         return np.zeros((MEMORY_ROWS + len(self.canceller), max(6, self.plant.spools)))
+
+    def init_at(self, place: Array, force: Array) -> Array:
+        """The controller's memory at rest at a place (6,) [m, rad], held by forces (n_actuators,) [N]."""
+        memory, axes = self.init(), self.plant.axes
+        drive = self.drive_for(place[None], *np.zeros((2, 1, 6)))[0]
+        memory[POSE, :6] = place
+        memory[FORCE, : len(axes)] = (force - self.actuator["force"]) @ self.jacobian[:, axes]
+        for a, k in enumerate(axes):
+            row = self.axis[a]
+            for first, matrix, inputs in (
+                (GENERATOR, row["generator_a"], row["generator_b"] * drive[k]),
+                (FEEDBACK, row["feedback_a"], row["feedback_b"] @ np.array([place[k], 0.0])),
+            ):
+                memory[first : first + len(matrix), a] = np.linalg.solve(np.eye(len(matrix)) - matrix, inputs)
+        return memory
 
     def step(self, memory: Array, sample: int, drive: Array, sensors: Feedback) -> Array:
         """Command (n_actuators,) of a sample from drive (n, columns) and the sensors.

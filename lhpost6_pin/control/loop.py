@@ -34,8 +34,8 @@ from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import unpack_workspace
 from .filters import NOTCHES
 
-__all__ = ["ACTUATOR", "AXIS", "CANCELLER", "MEMORY_ROWS", "ControlTables", "Feedback", "control_packed"]
-__all__ += ["control_sample", "control_step", "pack_control", "sense", "sense_packed"]
+__all__ = ["ACTUATOR", "AXIS", "CANCELLER", "FEEDBACK", "FORCE", "GENERATOR", "MEMORY_ROWS", "POSE", "ControlTables"]
+__all__ += ["Feedback", "control_packed", "control_sample", "control_step", "pack_control", "sense", "sense_packed"]
 
 AXIS = np.dtype(
     [
@@ -136,9 +136,9 @@ def unpack_control(packed):
     )
 
 
-_POSE, _RESET, _FORCE, _HIGH_PASSED, _CLIPPED = range(5)
-_GENERATOR, _FEEDBACK, _NOTCH = 5, 9, 12
-MEMORY_ROWS = _NOTCH + 2 * NOTCHES
+POSE, RESET, FORCE, HIGH_PASSED, CLIPPED = range(5)
+GENERATOR, FEEDBACK, NOTCH = 5, 9, 12
+MEMORY_ROWS = NOTCH + 2 * NOTCHES
 """Rows of the memory: pose estimate, reset integral, force at the last sample, its high-passed value, number of clipped
 commands at the last sample, states of the reference generator (4), of the feedback generator (3) and of the notches (2
 each); then two weights per canceller."""
@@ -221,7 +221,7 @@ def control_step(sample, drive, feedback, tables, control, memory, command):
     for i in range(legs.size):
         if legs[i].pad >= 0:
             ports = max(ports, legs[i].pad + 2)
-    pose = memory[_POSE]
+    pose = memory[POSE]
     s = np.empty(ports)
     J = np.empty((ports, 6))
     B = np.empty((ports, 6))
@@ -235,23 +235,23 @@ def control_step(sample, drive, feedback, tables, control, memory, command):
     for a in range(axes.size):
         k = axes[a]
         row = axis[a]
-        compose(row, pose[k], acceleration[k], memory[_FEEDBACK:], a, measured)
+        compose(row, pose[k], acceleration[k], memory[FEEDBACK:], a, measured)
         wanted = drive[sample, k]
         if canceller.size > 0:
             level = drive[sample, 12]
-            scaled_error = level * (drive[sample, 6 + k] - measured[2]) if memory[_CLIPPED, 0] == 0.0 else 0.0
+            scaled_error = level * (drive[sample, 6 + k] - measured[2]) if memory[CLIPPED, 0] == 0.0 else 0.0
             wanted += cancel(canceller, sample, a, scaled_error, level, memory[MEMORY_ROWS:])
-        generate(row, wanted, memory[_GENERATOR:], a, reference)
+        generate(row, wanted, memory[GENERATOR:], a, reference)
         total = 0.0
         for i in range(n):
             total += K[i, k] * (force[i] - actuator[i].force)
-        passed = row.high_pass * (memory[_HIGH_PASSED, a] + total - memory[_FORCE, a])
-        memory[_FORCE, a] = total
-        memory[_HIGH_PASSED, a] = passed
+        passed = row.high_pass * (memory[HIGH_PASSED, a] + total - memory[FORCE, a])
+        memory[FORCE, a] = total
+        memory[HIGH_PASSED, a] = passed
         error = reference[0] - measured[0]
-        reset = memory[_RESET, a] + row.reset_gain * error
+        reset = memory[RESET, a] + row.reset_gain * error
         reset = min(row.reset_limit, max(-row.reset_limit, reset))
-        memory[_RESET, a] = reset
+        memory[RESET, a] = reset
         speed = (
             row.displacement_feedforward * reference[0]
             + row.velocity_feedforward * reference[1]
@@ -264,7 +264,7 @@ def control_step(sample, drive, feedback, tables, control, memory, command):
             - row.force_gain * passed
         )
         for j in range(int(row.notches)):
-            at = _NOTCH + 2 * j
+            at = NOTCH + 2 * j
             out = row.notch[j, 0] * speed + memory[at, a]
             memory[at, a] = row.notch[j, 1] * speed - row.notch[j, 3] * out + memory[at + 1, a]
             memory[at + 1, a] = row.notch[j, 2] * speed - row.notch[j, 4] * out
@@ -284,7 +284,7 @@ def control_step(sample, drive, feedback, tables, control, memory, command):
             clipped += 1
             spool = row.limit if spool > 0.0 else -row.limit
         command[i] = spool
-    memory[_CLIPPED, 0] = clipped
+    memory[CLIPPED, 0] = clipped
     return clipped
 
 

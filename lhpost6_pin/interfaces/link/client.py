@@ -110,6 +110,15 @@ class LinkClient:
             fresh = self._take(frame) or fresh
         return fresh
 
+    def wait(self, seconds: float) -> Reading | None:
+        """The newest sensors, once some have come, or None if none come within a time [s]."""
+        select.select([self._sock], [], [], seconds)
+        return self.newest()
+
+    def keep(self) -> None:
+        """Keep the plant without commanding it: a server frees one whose client is silent for ten seconds."""
+        self._put(Datagram(Kind.HELLO, self._session))
+
     def exchange(self, command: Array, wrench: ArrayLike | None = None) -> Reading:
         """Send a command, with a wrench as `send` takes it, and return the next sensors.
 

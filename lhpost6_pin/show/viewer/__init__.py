@@ -6,18 +6,20 @@ is a file that plays off line (`viewer_page`) or a page on loopback. `live` move
 """
 
 from .frames import Frames, Look, make_frames, record_frames
-from .live import LiveView, view_apart
+from .live import LiveScene, LiveView, view_apart
 from .show import live_animation, show_record
 from .viewer_page import Picture
-from .window import LoopbackWindow, Recorder
+from .window import LoopbackWindow, Recorder, SharedWindow
 
 __all__ = [
     "Frames",
+    "LiveScene",
     "LiveView",
     "Look",
     "LoopbackWindow",
     "Picture",
     "Recorder",
+    "SharedWindow",
     "live_animation",
     "make_frames",
     "record_frames",

@@ -23,85 +23,46 @@ from .frames import AS_IT_IS, Look
 from .scene import draw_arrows, draw_machine, draw_names, table_of
 from .show import machine_legend
 from .viewer_page import Caption, render_page
-from .window import LoopbackWindow
+from .window import LoopbackWindow, SharedWindow
 
-__all__ = ["LiveView", "view_apart"]
+__all__ = ["LiveScene", "LiveView", "view_apart"]
 
 PAUSE = 0.05  # [s] between looks at whether a pause has ended
 MOST_UNSEEN = 8  # snapshots sent and not yet drawn, from which on further ones are dropped
 
 
-class LiveView:
-    """A page on this computer that shows a plant as it moves, while used in a ``with`` block.
+class LiveScene:
+    """A plant as it moves, in a window of its own page.
 
     Arrows are scaled by the forces at the start: the largest of them is drawn at half the longest length. Meters show
-    displacements and actuator forces over their capacities. A browser may pause: with `real_time` the plant waits.
+    displacements and actuator forces over their capacities.
     """
 
     def __init__(
-        self,
-        machine: Machine,
-        title: str,
-        look: Look = AS_IT_IS,
-        *,
-        real_time: bool = True,
-        ended: Callable[[], bool] = lambda: False,
+        self, machine: Machine, title: str, window: Callable[[str], SharedWindow], look: Look = AS_IT_IS
     ) -> None:
-        """Prepare the page; with `real_time` motion is no faster than real, and a pause lasts until `ended` at most.
-
-        Raises ParameterError as `Look.refuse`.
-        """
+        """Draw the machine in the `window` of its page; raises ParameterError as `Look.refuse`."""
         look.refuse()
-        self._ended, self._limits = ended, plant_limits(make_plant(machine))
-        self._machine, self._look, self._real_time = machine, look, real_time
+        self._limits = plant_limits(make_plant(machine))
+        self._machine, self._look = machine, look
         self._bodies = load_bodies(machine)
         self._names = [leg.name for leg in legs(machine)]
         note = f"{machine.name}, live, {look.size}; +X to the right"
-        self._window = LoopbackWindow(render_page(Caption(title, note, machine_legend(machine)), live=True))
+        self._window = window(render_page(Caption(title, note, machine_legend(machine)), live=True))
         draw_machine(self._window, machine, self._bodies)
         draw_arrows(self._window, self._names)
         draw_names(self._window, machine)
         shaped = {shape.parentJoint for shape in self._bodies.shapes}
         self._table = table_of(self._window)
         self._moving = {j: body_name(self._bodies.model, j) for j in shaped if j > 0}  # by joint
-        self._begin: float | None = None  # by the clock [s], of the plant's time zero
-        self._largest = 1.0  # force of the longest arrow [N]
+        self._largest = 0.0  # force of the longest arrow [N]; 0 before the first snapshot
         self._still = np.zeros(len(self._names))  # forces that are not drawn [N]
 
-    @property
-    def url(self) -> str:
-        """Address of the page."""
-        return self._window.url
-
-    def __enter__(self) -> "LiveView":
-        """Start to serve."""
-        self._window.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Stop serving."""
-        self._window.__exit__(kind, error, trace)
-
-    def wait(self, seconds: float) -> bool:
-        """Wait until a browser is connected, at most so long [s]; True if one is."""
-        return self._window.wait(seconds)
-
-    def show(self, snapshot: Snapshot) -> None:
-        """Draw one snapshot; returns at once, or in real time when it is due."""
-        if self._window.paused.is_set():
-            if not self._real_time:
-                return  # the plant goes on, its picture rests
-            since = time.monotonic()
-            while self._window.paused.is_set() and not self._ended():
-                time.sleep(PAUSE)
-            self._begin = None if self._begin is None else self._begin + time.monotonic() - since
-        if self._begin is None:
-            self._begin, self._largest = time.monotonic() - snapshot.time, 2.0 * largest_force(snapshot.force)
+    def draw(self, snapshot: Snapshot) -> None:
+        """Draw one snapshot at once."""
+        if not self._largest:
+            self._largest = 2.0 * largest_force(snapshot.force)
             self._still = snapshot.force if self._look.change else self._still
-        if self._real_time:
-            time.sleep(max(0.0, self._begin + snapshot.time - time.monotonic()))
         q = joint_positions(self._machine, self._bodies.model, self._look.amplify * snapshot.displacement)
         poses = body_poses(self._bodies.model, q)[0]
         for joint, name in self._moving.items():
@@ -124,6 +85,69 @@ class LiveView:
             displacements = snapshot.displacement / self._limits["displacement"]
         named = zip([*AXES, *self._machine.actuator_names], [*displacements, *forces], strict=True)
         return {name: round(float(np.clip(share, -9.99, 9.99)), 3) for name, share in named if not np.isnan(share)}
+
+
+class LiveView(LiveScene):
+    """A page on this computer that shows a plant as it moves, while used in a ``with`` block.
+
+    A browser may pause: with `real_time` the plant waits.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        title: str,
+        look: Look = AS_IT_IS,
+        *,
+        real_time: bool = True,
+        ended: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Prepare the page; with `real_time` motion is no faster than real, and a pause lasts until `ended` at most.
+
+        Raises ParameterError as `Look.refuse`.
+        """
+        super().__init__(machine, title, self._open, look)
+        self._ended, self._real_time = ended, real_time
+        self._begin: float | None = None  # by the clock [s], of the plant's time zero
+
+    def _open(self, page: str) -> SharedWindow:
+        self._served = LoopbackWindow(page)
+        return self._served
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return self._served.url
+
+    def __enter__(self) -> "LiveView":
+        """Start to serve."""
+        self._served.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop serving."""
+        self._served.__exit__(kind, error, trace)
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until a browser is connected, at most so long [s]; True if one is."""
+        return self._served.wait(seconds)
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Draw one snapshot; returns at once, or in real time when it is due."""
+        if self._served.paused.is_set():
+            if not self._real_time:
+                return  # the plant goes on, its picture rests
+            since = time.monotonic()
+            while self._served.paused.is_set() and not self._ended():
+                time.sleep(PAUSE)
+            self._begin = None if self._begin is None else self._begin + time.monotonic() - since
+        if self._begin is None:
+            self._begin = time.monotonic() - snapshot.time
+        if self._real_time:
+            time.sleep(max(0.0, self._begin + snapshot.time - time.monotonic()))
+        self.draw(snapshot)
 
 
 @contextmanager

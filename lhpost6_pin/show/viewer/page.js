@@ -95,7 +95,7 @@ function measure(meters) { // bars from the middle, to either end at the capacit
   }
 }
 if (live) { // what is sent: meshcat's commands, words on how it goes, and demand over capacity
-  const socket = new WebSocket(`ws://${location.host}/commands`);
+  const socket = new WebSocket(new URL("commands", location.href).href.replace(/^http/, "ws"));
   socket.binaryType = "arraybuffer";
   socket.onmessage = ({ data }) => {
     if (typeof data !== "string") { viewer.handle_command_bytearray(new Uint8Array(data)); return; }

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LoopbackWindow", "Recorder", "Window", "pack_command", "packed_array"]
+__all__ = ["HOSTS", "LoopbackWindow", "Recorder", "SharedWindow", "Window", "pack_command", "packed_array"]
 
 FLOAT_ARRAY = 0x17  # meshcat's msgpack extension type for a Float32Array
 LOOPBACK = "127.0.0.1"
@@ -58,25 +58,20 @@ class Recorder:
         self.commands.append(pack_command(command))
 
 
-class LoopbackWindow:
-    """A meshcat window served on 127.0.0.1 and nowhere else, while used in a ``with`` block.
+class SharedWindow:
+    """A meshcat window for any number of browsers, a part of a server: its `handlers`, in a loop that `joins` it.
 
     A late browser gets the last command of each kind to each object. `send` may be called from any thread.
     """
 
     def __init__(self, page: str) -> None:
-        """Prepare to serve a live `page` on a free port."""
+        """Prepare to show a live `page`."""
         self._page = page
         self._commands: dict[tuple[str, str, str], bytes] = {}
         self._browsers: set[Any] = set()
         self._lock = threading.Lock()
         self._ready, self._connected = threading.Event(), threading.Event()
         self.paused = threading.Event()  # by a browser, until one plays again or the last one leaves
-
-    @property
-    def url(self) -> str:
-        """Address of the page."""
-        return f"http://{LOOPBACK}:{self._port}/"
 
     def wait(self, seconds: float) -> bool:
         """Wait until a browser is connected, at most so long [s]; True if one is."""
@@ -97,6 +92,36 @@ class LoopbackWindow:
             self._commands[fields["type"], fields.get("path", ""), fields.get("property", "")] = packed
             if self._ready.is_set():
                 self._loop.call_soon_threadsafe(self._hand_out, packed)
+
+    def join(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Send by a loop from now on."""
+        self._loop = loop
+        self._ready.set()
+
+    def handlers(self, at: str = "/") -> list[Any]:
+        """Handlers of a tornado application: the page at an address that ends in ``/``, and its commands below."""
+        return _handlers(self, at)
+
+    def _hand_out(self, message: bytes | str) -> None:
+        for browser in list(self._browsers):
+            _write(browser, message)
+
+    def _welcome(self, browser: Any) -> None:
+        with self._lock:
+            self._browsers.add(browser)
+            commands = list(self._commands.values())
+        for packed in commands:
+            _write(browser, packed)
+        self._connected.set()
+
+
+class LoopbackWindow(SharedWindow):
+    """A meshcat window served on 127.0.0.1 and nowhere else, on a free port, while used in a ``with`` block."""
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return f"http://{LOOPBACK}:{self._port}/"
 
     def __enter__(self) -> "LoopbackWindow":
         """Start to serve, in a thread of its own. Raises OSError if there is no free port."""
@@ -120,28 +145,19 @@ class LoopbackWindow:
 
     async def _serve(self, sockets: list[socket.socket]) -> None:
         from tornado.httpserver import HTTPServer
+        from tornado.web import Application
 
-        self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
-        server = HTTPServer(_application(self))
+        self._stop = asyncio.Event()
+        application = Application()
+        application.add_handlers(HOSTS, self.handlers())
+        server = HTTPServer(application)
         server.add_sockets(sockets)
-        self._ready.set()
+        self.join(asyncio.get_running_loop())
         await self._stop.wait()
         server.stop()
         for browser in list(self._browsers):
             browser.close()
         await server.close_all_connections()
-
-    def _hand_out(self, message: bytes | str) -> None:
-        for browser in list(self._browsers):
-            _write(browser, message)
-
-    def _welcome(self, browser: Any) -> None:
-        with self._lock:
-            self._browsers.add(browser)
-            commands = list(self._commands.values())
-        for packed in commands:
-            _write(browser, packed)
-        self._connected.set()
 
 
 def _write(browser: Any, message: bytes | str) -> None:
@@ -153,9 +169,9 @@ def _write(browser: Any, message: bytes | str) -> None:
         written.add_done_callback(lambda done: done.cancelled() or done.exception())
 
 
-def _application(window: LoopbackWindow) -> Any:
-    """Page at ``/``, commands by websocket at ``/commands``, for requests to this computer by name only."""
-    from tornado.web import Application, RequestHandler
+def _handlers(window: SharedWindow, at: str) -> list[Any]:
+    """Page at an address, commands by websocket at ``commands`` below it."""
+    from tornado.web import RequestHandler
     from tornado.websocket import WebSocketHandler
 
     class Page(RequestHandler):
@@ -179,6 +195,4 @@ def _application(window: LoopbackWindow) -> Any:
             if not window._browsers:
                 window.paused.clear()
 
-    application = Application()
-    application.add_handlers(HOSTS, [(r"/", Page), (r"/commands", Commands)])
-    return application
+    return [(at, Page), (f"{at}commands", Commands)]

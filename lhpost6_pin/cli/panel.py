@@ -1,0 +1,79 @@
+"""The panel by which the table is driven by hand: panel."""
+
+import asyncio
+import signal
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..core.errors import LinkError, ParameterError
+from .app import command
+from .live_view import NoOpen, show_address
+from .options import SettingsName, SpecimenOptions, Valves, find_settings
+from .results_folder import folder_for
+
+if TYPE_CHECKING:
+    from ..panel.web import PanelServer
+
+__all__ = ["panel"]
+
+
+@command()
+def panel(
+    machine: SpecimenOptions,
+    out: Annotated[Path | None, typer.Option(help="Directory of recordings and journal; default: out/panel.")] = None,
+    controller: SettingsName = None,
+    valves: Valves = 0,
+    server: Annotated[
+        str | None, typer.Option(help="HOST:PORT of `lhpost6 serve --mode real-time`; default: a plant of its own.")
+    ] = None,
+    host: Annotated[str, typer.Option(help="Address to listen on; default: this computer only.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0: any free one.")] = 0,
+    no_open: NoOpen = False,
+) -> None:
+    """Drive the table by hand from a page in a browser: start-up, setpoints, waves, motions, interlocks, recordings.
+
+    With another --host the page is open to others, who need the token in the address that is printed.
+    """
+    from ..panel.session import Session
+    from ..panel.web import PanelServer
+    from ..panel.worker import Setup
+
+    table = machine.load(valves)
+    settings = find_settings(controller, table)
+    there = _address(server)
+    folder = folder_for(out, "panel")
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(2) as work:
+        facts = {"controller": settings.name}
+        setup = Setup(table, settings, None, Path(scratch) / "ring")
+        session = Session(setup, folder, there, work, facts)
+        try:
+            try:
+                page = PanelServer(session, host, port, False)
+            except OSError as error:
+                raise LinkError(f"cannot listen on {host}:{port}: {error}; choose another --host or --port") from error
+            show_address(page.url, f"the panel of {table.name}; Ctrl-C ends", not no_open)
+            asyncio.run(_serve(page))
+        finally:
+            session.close()
+
+
+async def _serve(page: "PanelServer") -> None:
+    """Serve until Ctrl-C or SIGTERM."""
+    stop, loop = asyncio.Event(), asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stop.set)
+    await page.run(stop)
+
+
+def _address(text: str | None) -> tuple[str, int] | None:
+    if text is None:
+        return None
+    host, colon, port = text.rpartition(":")
+    if not (colon and host and port.isdigit() and 0 < int(port) < 65536):
+        raise ParameterError(f"--server {text}: write HOST:PORT, such as 127.0.0.1:46946")
+    return host, int(port)

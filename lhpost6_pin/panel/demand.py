@@ -1,0 +1,32 @@
+"""Demand of a program over the capacity of a table, before it runs."""
+
+import numpy as np
+
+from ..core.arrays import Array
+from ..core.names import AXES, SAMPLE_RATE
+from ..mechanics.plant import Plant
+from ..motions import Reference, Target
+from ..simulation.motion_limits import check_motion_limits
+from .programs import Program
+
+__all__ = ["check_program"]
+
+_CYCLES, _LONGEST = 3.0, 60.0
+"""Of a wave without an end, so many of its cycles, and at most so long [s]."""
+
+
+def check_program(plant: Plant, program: Program, gain: Array, setpoint: Array) -> None:
+    """Check the motion of a program times `gain` (6,) about a setpoint (6,) at full rate of its clock.
+
+    Raises OutOfRangeError naming the limits that it exceeds.
+    """
+    seconds = program.duration or _LONGEST
+    frequency = getattr(program, "frequency", None)
+    if program.duration is None and frequency:
+        seconds = min(_LONGEST, _CYCLES / frequency)
+    time = np.arange(int(np.ceil(seconds * SAMPLE_RATE)) + 1) / SAMPLE_RATE
+    moved = program.at(time)
+    axes = tuple((axis, axis) for axis in AXES)
+    reference = Reference(program.name, "panel", 1.0, axes, 0.0, 0.0, 0.0)
+    rows = (setpoint + gain * moved.value, gain * moved.rate, gain * moved.acceleration)
+    check_motion_limits(plant, Target(time, *rows, reference))

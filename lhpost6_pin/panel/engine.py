@@ -1,0 +1,270 @@
+"""The controller of a driven table, sample by sample: without sockets, clocks and processes.
+
+Orders come as plain entries (`Order`); a sample is answered with a command, or with None where the table is not to be
+commanded: before high pressure, and after a trip, when the server goes to its safe hold by itself.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..control.controller import Controller, make_controller
+from ..control.loop import control_step
+from ..control.settings import ControllerSettings
+from ..core.arrays import Array
+from ..core.errors import ControllerError
+from ..core.names import SAMPLE_RATE
+from ..interfaces.link import PlantState, Reading
+from ..machine.parameters import Parameters
+from ..mechanics.equilibrium import Equilibrium
+from ..mechanics.plant import Plant
+from .drive import Drive
+from .interlocks import INTERLOCKS, Interlocks, Measured, measured_motion
+from .moves import Moved
+from .programs import Program
+from .rows import Rows
+
+__all__ = ["BLOCK", "Engine", "Status"]
+
+BLOCK = 32
+"""Samples whose reference is computed together: an order acts within 16 ms, a trip at once."""
+
+
+class Status(NamedTuple):
+    """What a panel shows of the controller beside the rows of samples."""
+
+    pressure: str  # low or high
+    platen: str  # parked, moving or raised
+    trip: str  # empty: none
+    program: str | None
+    state: str
+    program_time: float
+    duration: float | None
+    setpoint: tuple[float, ...]
+    span: tuple[float, ...]
+    scale: float
+    limits: tuple[float, ...]  # as `INTERLOCKS`
+    on: tuple[bool, ...]
+    where: tuple[str, ...]
+
+
+class Engine:
+    """Controller, reference and interlocks of one session with a plant."""
+
+    def __init__(
+        self,
+        plant: Plant,
+        rest: Equilibrium,
+        settings: ControllerSettings,
+        numbers: Parameters,
+        parked: float | None,
+        rows: Rows,
+    ) -> None:
+        """Prepare; `parked` is the height [m] of a parked platen, None for a machine that is not parked."""
+        self._controller: Controller = make_controller(plant, rest, settings)
+        self._tables = self._controller.tables
+        self._interlocks = Interlocks(self._controller, rest, numbers)
+        self._numbers, self._rows, self._parked = numbers, rows, parked
+        limits = plant.machine.limits
+        free = np.isin(np.arange(6), plant.axes)
+        self._speed = np.where(free, limits.velocity, np.inf)
+        self._speed[self._speed == 0.0] = np.inf
+        self._tolerance = numbers.number("raised.tolerance") * max(limits.displacement[2], 1e-3)
+        self._drive = Drive(numbers, self._speed, np.zeros(6))
+        self.pressure, self.trip = "low", ""
+        self._place, self._lifted, self._state = "raised", True, PlantState.WAITING
+        self._memory = self._controller.init()
+        self._command = rest.spool.copy()
+        self._block, self._first = Moved(*np.zeros((3, 0, 6))), 0
+        self._last = 0
+        self._now = Measured(np.zeros(6), np.zeros(6), np.zeros(6), rest.force)
+        self.row = np.zeros(rows.width)
+
+    # ------------------------------------------------------------------------------------- orders
+    def order(self, order: Mapping[str, Any], program: Program | None = None) -> None:
+        """Do what a driver wants, from the next sample on that is not computed yet; a trip acts at once.
+
+        Raises ControllerError with the reason for what cannot be done now.
+        """
+        do = str(order.get("do"))
+        actions: dict[str, Callable[[Mapping[str, Any]], None]] = {
+            "pressure": self._pressure,
+            "raise": lambda _: self._lift("raised", np.zeros(6)),
+            "park": lambda _: self._lift("parked", np.array([0.0, 0.0, self._parked or 0.0, 0.0, 0.0, 0.0])),
+            "setpoint": self._setpoint,
+            "span": lambda o: self._drive.set_span(np.asarray(o["values"], float), self._next),
+            "scale": lambda o: self._drive.set_scale(float(o["value"]), self._next),
+            "load": lambda _: self._load(program),
+            "run": self._run,
+            "hold": self._hold,
+            "stop": lambda _: None if self._free else self._drive.stop(self._next),
+            "trip": lambda o: self.trip_by(f"by {o.get('who', 'the operator')}, at {self._last / SAMPLE_RATE:.3f} s"),
+            "reset": self._reset,
+            "interlock": self._interlock,
+        }
+        if do not in actions:
+            raise ControllerError(f"no order {do!r}")
+        actions[do](order)
+
+    def trip_by(self, reason: str) -> None:
+        """Stop commanding, and end the program; the first reason stays."""
+        if not self.trip and self.pressure == "high":
+            self.trip = reason
+            self._drive.take_over(self._now.displacement, self._last)
+
+    def _pressure(self, order: Mapping[str, Any]) -> None:
+        to = str(order["to"])
+        if to == "high":
+            _refuse(bool(self.trip), "the table has tripped; reset it first")
+            if self.pressure != "high":
+                self._start_at_place()
+                self._place = "parked" if self._near(self._parked) else "raised"
+        elif self.pressure == "high" and not self.trip:
+            _refuse(not self._free, "a program runs; stop it first")
+            _refuse(self._parked is not None and self.platen != "parked", "the platen is not parked; park it first")
+        self.pressure = to
+
+    def _lift(self, place: str, setpoint: Array) -> None:
+        self._ready()
+        _refuse(self._parked is None, "this table is not parked: it stands in its zero position")
+        _refuse(not self._free, "a program runs; stop it first")
+        self._place, self._lifted = place, False
+        self._drive.move_setpoint(setpoint, self._next)
+
+    def _setpoint(self, order: Mapping[str, Any]) -> None:
+        self._ready(raised=True)
+        self._drive.move_setpoint(np.asarray(order["values"], float), self._next)
+
+    def _load(self, program: Program | None) -> None:
+        _refuse(not self._free, "a program runs; stop it first")
+        assert program is not None
+        self._drive.load(program)
+
+    def _run(self, _: Mapping[str, Any]) -> None:
+        self._ready(raised=True)
+        _refuse(self._drive.program is None, "no program; choose a wave of the function generator or a motion")
+        self._drive.run(self._next)
+
+    def _hold(self, _: Mapping[str, Any]) -> None:
+        _refuse(self._free, "nothing runs")
+        self._drive.hold(self._next)
+
+    def _reset(self, _: Mapping[str, Any]) -> None:
+        _refuse(not self.trip, "nothing has tripped")
+        _refuse(self._state == PlantState.TRIPPED, "the plant has stopped; set the pressure off, and start again")
+        at = self._interlocks.look(self._now, np.zeros(len(self._command)))
+        if at is not None:
+            raise ControllerError(f"still {self._interlocks.reason(at, self._last / SAMPLE_RATE)}; raise that limit")
+        self.trip = ""
+        self._start_at_place()
+        self._drive.move_setpoint(self._drive.setpoint, self._last)
+
+    def _interlock(self, order: Mapping[str, Any]) -> None:
+        at = INTERLOCKS.index(str(order["name"]))
+        limit = float(order.get("limit", self._interlocks.limit[at]))
+        _refuse(not 0.0 < limit < np.inf, f"a limit of {limit:g}; give a share of capacity above zero")
+        self._interlocks.limit[at] = limit
+        self._interlocks.on[at] = bool(order.get("on", self._interlocks.on[at]))
+
+    @property
+    def _next(self) -> int:
+        """First sample whose reference is not computed yet."""
+        return max(self._first + len(self._block.value), self._last + 1)
+
+    @property
+    def _free(self) -> bool:
+        """Whether no program runs."""
+        return self._drive.state(self._last).state == "stopped"
+
+    def _ready(self, raised: bool = False) -> None:
+        _refuse(self.pressure != "high", "the pressure is not high; raise it first")
+        _refuse(bool(self.trip), "the table has tripped; reset it first")
+        _refuse(raised and self._place == "parked", "the platen is parked; raise it first")
+
+    def _start_at_place(self) -> None:
+        """Take the platen over where it is."""
+        place = np.where(np.isfinite(self._speed), self._now.displacement, 0.0)
+        self._memory = self._controller.init_at(place, self._now.force)
+        self._drive.take_over(place, self._last)
+        self._interlocks.begin()
+        self._block = Moved(*np.zeros((3, 0, 6)))
+
+    def _near(self, height: float | None) -> bool:
+        return height is not None and bool(abs(self._now.displacement[2] - height) < self._tolerance)
+
+    @property
+    def platen(self) -> str:
+        """Whether the platen is parked, raised, or moving from one to the other."""
+        settled = self._drive.state(self._last).settled
+        if self._place == "parked":
+            return "parked" if settled and self._near(self._parked) else "moving"
+        self._lifted = self._lifted or settled
+        return "raised" if self._lifted else "moving"
+
+    # ------------------------------------------------------------------------------------- samples
+    def answer(self, reading: Reading) -> Array | None:
+        """Command (n_actuators,) of the sample that has been read; None: it is not commanded. `row` is filled."""
+        sample = reading.sample
+        self._last, self._state, now = sample, reading.state, measured_motion(reading)
+        self._now = now
+        if reading.state == PlantState.TRIPPED:
+            self.trip_by("the plant stopped: an actuator reached the end of its stroke, or the run diverged")
+        wanted = self._reference(sample) if self.pressure == "high" and not self.trip else None
+        if wanted is not None and (at := self._interlocks.look(now, self._command)) is not None:
+            self.trip_by(self._interlocks.reason(at, sample / SAMPLE_RATE))
+            wanted = None
+        command = None
+        if wanted is not None:
+            drive = self._controller.drive_for(*(x[None] for x in wanted))
+            command = np.empty(len(self._command))
+            control_step(0, drive, reading.sensors, self._controller.plant.tables, self._tables, self._memory, command)
+            self._command = command
+        self._fill(reading, now, wanted)
+        return command
+
+    @property
+    def status(self) -> Status:
+        """State at the last sample."""
+        drive, look = self._drive.state(self._last), self._interlocks
+        return Status(
+            self.pressure,
+            self.platen,
+            self.trip,
+            drive.program,
+            drive.state,
+            drive.time,
+            drive.duration,
+            tuple(map(float, self._drive.setpoint)),
+            tuple(map(float, self._drive.span)),
+            self._drive.scale,
+            tuple(map(float, look.limit)),
+            tuple(map(bool, look.on)),
+            tuple(look.where(i) for i in range(len(INTERLOCKS))),
+        )
+
+    def _fill(self, reading: Reading, now: Measured, wanted: Moved | None) -> None:
+        row, places = self.row, self._rows.places
+        state = self._drive.state(self._last)
+        codes = ("stopped", "running", "holding", "stopping").index(state.state)
+        row[:4] = reading.sample, int(reading.state), 4 if self.trip else codes, state.time
+        for name in ("displacement", "velocity", "acceleration"):
+            row[places[f"platen_{name}"]] = getattr(now, name)
+        for name, value in zip(("displacement", "velocity", "acceleration"), wanted or now[:3], strict=True):
+            row[places[f"reference_{name}"]] = value
+        row[places["shares"]] = self._interlocks.shares
+        row[places["actuator_displacement"]] = reading.sensors.displacement
+        row[places["actuator_force"]] = now.force
+        row[places["spool_command"]] = self._command
+
+    def _reference(self, sample: int) -> Moved:
+        """Reference (6,) each of a sample."""
+        at = sample - self._first
+        if not 0 <= at < len(self._block.value):
+            self._block, self._first, at = self._drive.advance(sample, BLOCK), sample, 0
+        return Moved(*(x[at] for x in self._block))
+
+
+def _refuse(wrong: bool, why: str) -> None:
+    if wrong:
+        raise ControllerError(why)

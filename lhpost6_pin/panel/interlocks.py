@@ -1,0 +1,108 @@
+"""Interlocks: demand over capacity of a driven table, sample by sample, and the limits at which it trips.
+
+Displacement, velocity and acceleration of the platen by axis over the machine's limits; force of each actuator beyond
+rest over what remains of its range; moment of all actuators about the level axes, beyond rest, at N over the capacity
+along that axis; time during which a spool command is at its limit without a break, over the time stated.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..control.controller import Controller
+from ..core.arrays import Array
+from ..core.names import AXES, SAMPLE_RATE
+from ..interfaces.link import Reading
+from ..machine.parameters import Parameters
+from ..mechanics.actuator_forces import axis_capacity, force_range, wrench_at_bearings
+from ..mechanics.equilibrium import Equilibrium
+from ..mechanics.instant import motion_at
+
+__all__ = ["INTERLOCKS", "Interlocks", "Measured", "measured_motion"]
+
+INTERLOCKS = ("displacement", "velocity", "acceleration", "force", "overturning", "saturation")
+"""Names of the interlocks, in the order of a row's shares."""
+
+_UNITS = {"displacement": ("m", "rad"), "velocity": ("m/s", "rad/s"), "acceleration": ("m/s2", "rad/s2")}
+
+
+class Measured(NamedTuple):
+    """Motion of the platen at C (6,) each, Euler angles, and force of the actuators (n,), in SI."""
+
+    displacement: Array
+    velocity: Array
+    acceleration: Array
+    force: Array
+
+
+def measured_motion(reading: Reading) -> Measured:
+    """What sensors and the motion of the interface say of the platen."""
+    displacement, velocity = motion_at(reading.motion.pose, reading.motion.twist)
+    return Measured(displacement, velocity, reading.sensors.acceleration, reading.sensors.force)
+
+
+class Interlocks:
+    """Limits of a table that is driven.
+
+    Attributes: limit, share of capacity at which each trips, and on, whether it does; both (6,) as `INTERLOCKS`.
+    shares (6,), the largest demand over capacity of the last sample, and where it is.
+    """
+
+    def __init__(self, controller: Controller, rest: Equilibrium, numbers: Parameters) -> None:
+        """Take the capacities of a plant; raises as `axis_capacity` does."""
+        plant = controller.plant
+        limits, free = plant.machine.limits, np.isin(np.arange(6), plant.axes)
+        stated = np.array([limits.displacement, limits.velocity, limits.acceleration])
+        with np.errstate(divide="ignore"):
+            self._per = np.where(free & (stated > 0.0), 1.0 / stated, 0.0)  # (3, 6)
+        self._capacity = stated
+        span, self._rest = force_range(plant), rest.force
+        self._rise = 1.0 / np.maximum(span.most - rest.force, 1.0)
+        self._fall = 1.0 / np.maximum(rest.force - span.least, 1.0)
+        along = axis_capacity(plant)
+        at_b = controller.jacobian @ controller.lever  # (n, 6): leg rates per twist at B
+        self._moment = wrench_at_bearings(plant, at_b)[:, 3:5].T  # (2, n) moments at N per force
+        self._turn = np.array([along.rise[3:5], along.fall[3:5]])
+        self._turn[self._turn == 0.0] = np.inf
+        self._names = plant.machine.actuator_names
+        self._spool = controller.settings.spool_limit
+        self._longest = numbers.number("interlock.saturation") * SAMPLE_RATE
+        self._run = np.zeros(plant.spools)  # samples at the limit
+        self.limit = np.full(len(INTERLOCKS), numbers.number("interlock.limit"))
+        self.on = np.ones(len(INTERLOCKS), bool)
+        self.shares, self._worst = np.zeros(len(INTERLOCKS)), np.zeros(len(INTERLOCKS), int)
+
+    def begin(self) -> None:
+        """Forget the commands so far."""
+        self._run[:] = 0.0
+
+    def look(self, now: Measured, command: Array) -> int | None:
+        """Number of an interlock whose limit is passed, or None; command (n,) is the last one."""
+        motion = np.abs(np.array(now[:3])) * self._per
+        beyond = now.force - self._rest
+        force = np.where(beyond > 0.0, beyond * self._rise, -beyond * self._fall)
+        moment = self._moment @ beyond
+        turn = np.where(moment > 0.0, moment / self._turn[0], -moment / self._turn[1])
+        self._run = np.where(np.abs(command) >= self._spool - 1e-9, self._run + 1.0, 0.0)
+        for i, row in enumerate((*motion, force, turn, self._run / self._longest)):
+            at = int(row.argmax())
+            self.shares[i], self._worst[i] = row[at], at
+        over = (self.shares > self.limit) & self.on
+        return int(over.argmax()) if over.any() else None
+
+    def where(self, i: int) -> str:
+        """Axis or actuator of an interlock's largest share."""
+        at = int(self._worst[i])
+        if i < 3:
+            return AXES[at]
+        return AXES[3 + at] if INTERLOCKS[i] == "overturning" else self._names[at]
+
+    def reason(self, i: int, time: float) -> str:
+        """Why an interlock trips, in words."""
+        name, at, share = INTERLOCKS[i], int(self._worst[i]), float(self.shares[i])
+        what = f"{name} of {self.where(i)} at {100.0 * share:.1f} % of capacity, limit {100.0 * self.limit[i]:g} %"
+        if i < 3:
+            unit = _UNITS[name][at > 2]
+            bound = float(self._capacity[i, at])
+            what = f"{name} of {self.where(i)} {share * bound:.4g} {unit}, limit {self.limit[i] * bound:.4g} {unit}"
+        return f"{what}, at {time:.3f} s"

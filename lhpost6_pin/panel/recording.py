@@ -1,0 +1,91 @@
+"""Recordings of a driven table: rows of samples, and the record that they make."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..core.arrays import Array
+from ..core.errors import RecordError
+from ..core.names import SAMPLE_RATE
+from ..data.records import make_record
+from ..machine.machine import Machine
+from ..machine.recorded_changes import change_facts
+from ..machine.recorded_specimen import specimen_facts
+from ..mechanics.pose import PlatenMotion
+from ..simulation.outputs import reference_channels
+from .rows import Rows
+
+__all__ = ["Recording", "record_of_rows"]
+
+_SAME: tuple[str, ...] = ("platen_displacement", "platen_velocity", "platen_acceleration")
+_SAME += ("actuator_displacement", "actuator_force", "spool_command")
+
+
+class Recording:
+    """Rows since a recording began; attribute `name`."""
+
+    def __init__(self, name: str) -> None:
+        """Begin without rows."""
+        self.name = name
+        self._rows: list[Array] = []
+        self._count = 0
+
+    @property
+    def seconds(self) -> float:
+        """Duration so far [s]."""
+        return self._count / SAMPLE_RATE
+
+    def add(self, rows: Array) -> None:
+        """Append rows (n, width)."""
+        if len(rows):
+            self._rows.append(rows)
+            self._count += len(rows)
+
+    def rows(self) -> Array:
+        """All rows (n, width)."""
+        return np.concatenate(self._rows) if self._rows else np.zeros((0, 0))
+
+
+def record_of_rows(rows: Array, layout: Rows, machine: Machine, attrs: Mapping[str, Any]) -> xr.Dataset:
+    """Record of rows (n, width) in the layout of measured tests, as long as one session lasts.
+
+    A sample that the controller missed repeats the row before it; `answered` is 0 there. attrs: further attributes.
+    Raises RecordError for fewer than two samples.
+    """
+    if len(rows) < 2:
+        raise RecordError("nothing was recorded: the table was not under pressure; set it high first")
+    sample = rows[:, 0].astype(int)
+    again = np.flatnonzero(np.diff(sample) < 0)  # a session that began anew counts from zero
+    if len(again):
+        rows, sample = rows[: again[0] + 1], sample[: again[0] + 1]
+    sample, first = np.unique(sample, return_index=True)  # before the first command a sample is read again and again
+    rows = rows[first]
+    if len(rows) < 2:
+        raise RecordError("nothing was recorded: the table did not move; set the pressure high first")
+    every = np.arange(sample[0], sample[-1] + 1)
+    at = np.searchsorted(sample, every, side="right") - 1
+    rows = rows[at]
+    about = {"units": "1", "long_name": "1 if the controller answered this sample"}
+    channels: dict[str, Any] = {name: layout.of(rows, name) for name in _SAME}
+    channels["answered"] = (("time",), (sample[at] == every).astype(np.int8), about)
+    channels |= reference_channels(
+        PlatenMotion(*(layout.of(rows, f"reference_{q}") for q in ("displacement", "velocity", "acceleration")))
+    )
+    labels = machine.labels
+    if "chamber_pressure_a" in layout.widths:
+        double = [name in machine.double_acting for name in machine.actuator_names]
+        channels |= {name: layout.of(rows, name) for name in ("chamber_pressure_a", "spool_position")}
+        channels["supply_pressure"] = layout.of(rows, "supply_pressure")[:, 0]
+        if any(double):
+            channels["chamber_pressure_b"] = layout.of(rows, "chamber_pressure_b")[:, double]
+        if machine.struts:
+            channels["strut_pressure"] = layout.of(rows, "strut_pressure")
+    facts = {
+        "kind": "simulated",
+        "machine": machine.name,
+        **change_facts(machine),
+        **specimen_facts(machine.specimen),
+    }
+    return make_record((every - every[0]) / SAMPLE_RATE, channels, labels, {**facts, **attrs})

@@ -1,0 +1,47 @@
+"""One row of numbers a sample: what the controller of a panel measured, wanted and commanded, by name."""
+
+from functools import cached_property
+
+from ..core.arrays import Array
+from .interlocks import INTERLOCKS
+
+__all__ = ["Rows"]
+
+STATE = ("sample", "plant_state", "state", "program_time")
+
+
+class Rows:
+    """Places of named columns in a row, for a plant of so many actuators and struts.
+
+    `pressures`: the server sends chamber pressures, spools, strut pressures and the supply pressure, too.
+    """
+
+    def __init__(self, actuators: int, struts: int, pressures: bool) -> None:
+        """Lay out the columns."""
+        widths = dict.fromkeys(STATE, 1)
+        for who in ("platen", "reference"):
+            widths |= {f"{who}_{quantity}": 6 for quantity in ("displacement", "velocity", "acceleration")}
+        widths |= {"shares": len(INTERLOCKS)}
+        widths |= dict.fromkeys(("actuator_displacement", "actuator_force", "spool_command"), actuators)
+        if pressures:
+            widths |= dict.fromkeys(("chamber_pressure_a", "chamber_pressure_b", "spool_position"), actuators)
+            widths |= {"strut_pressure": struts, "supply_pressure": 1}
+        self.widths = widths
+
+    @cached_property
+    def places(self) -> dict[str, slice]:
+        """Columns of each name."""
+        found, at = {}, 0
+        for name, width in self.widths.items():
+            found[name] = slice(at, at + width)
+            at += width
+        return found
+
+    @property
+    def width(self) -> int:
+        """Numbers of a row."""
+        return sum(self.widths.values())
+
+    def of(self, rows: Array, name: str) -> Array:
+        """Columns (n, k) of a name in rows (n, width)."""
+        return rows[:, self.places[name]]

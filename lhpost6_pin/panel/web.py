@@ -1,0 +1,317 @@
+"""The panel's page on a server: files, one websocket for each browser, the 3-D view."""
+
+import asyncio
+import json
+import re
+import secrets
+import socket
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.arrays import Array
+from ..core.jsonable import jsonable
+from ..core.names import AXES, SAMPLE_RATE
+from ..mechanics.plant import make_plant
+from ..motions import list_motions
+from ..show.viewer import LiveScene, SharedWindow
+from ..show.viewer.window import HOSTS
+from ..simulation.limit_use import plant_limits
+from ..simulation.snapshot import Snapshot
+from .interlocks import INTERLOCKS
+from .programs import WAVES
+from .session import Seat, Session
+
+__all__ = ["PanelServer"]
+
+RATE = 25.0
+"""Messages a second to each browser."""
+_EVERY = 8  # samples between those drawn by the scopes
+_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; frame-src 'self'; "
+    "img-src 'self' data:"
+)
+
+
+class PanelServer:
+    """The server of a session's page: on this computer only, or, with a token, at an address for others."""
+
+    def __init__(self, session: Session, host: str, port: int, trainer: bool) -> None:
+        """Listen; raises OSError if the address cannot be had."""
+        from tornado.netutil import bind_sockets
+
+        self._session, self._trainer = session, trainer
+        self._local = host in ("127.0.0.1", "localhost", "::1")
+        self._token = "" if self._local else secrets.token_urlsafe(16)
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        self._sockets = bind_sockets(port, host, family=family)
+        self._port = int(self._sockets[0].getsockname()[1])
+        self._host = host
+        self._browsers: dict[str, Any] = {}
+        self._sent: dict[str, int] = {}  # entries of the journal by browser
+        machine = session.machine
+        self._scene = LiveScene(machine, machine.name, self._window)
+        self._capacity = plant_limits(make_plant(machine))
+        self._work = ThreadPoolExecutor(1)
+        self._number = 0
+        self._rows: Array = np.zeros((0, session.layout.width))
+        self._last = np.zeros(session.layout.width)
+
+    def _window(self, page: str) -> SharedWindow:
+        self._shared = SharedWindow(page)
+        return self._shared
+
+    @property
+    def url(self) -> str:
+        """Address of the page, with its token if it needs one."""
+        at = f"[{self._host}]" if ":" in self._host else self._host
+        return f"http://{at}:{self._port}/" + (f"?token={self._token}" if self._token else "")
+
+    async def run(self, stop: asyncio.Event) -> None:
+        """Serve until the event is set."""
+        from tornado.httpserver import HTTPServer
+        from tornado.web import Application
+
+        loop = asyncio.get_running_loop()
+        self._loop = loop
+        application = Application(cookie_secret=secrets.token_hex(16))
+        handlers = [*_handlers(self), *(_guarded(self, rule) for rule in self._shared.handlers("/view/"))]
+        application.add_handlers(HOSTS if self._local else ".*", handlers)
+        server = HTTPServer(application)
+        server.add_sockets(self._sockets)
+        self._shared.join(loop)
+        due = loop.time()
+        try:
+            while not stop.is_set():
+                self._look()
+                due = max(due + 1.0 / RATE, loop.time())
+                await asyncio.sleep(due - loop.time())
+        finally:
+            server.stop()
+            for browser in list(self._browsers.values()):
+                browser.close()
+            await server.close_all_connections()
+
+    def allows(self, token: str | None) -> bool:
+        """Whether a request with this token may look."""
+        return not self._token or (token is not None and secrets.compare_digest(token, self._token))
+
+    @property
+    def token(self) -> str:
+        """The token; empty on this computer."""
+        return self._token
+
+    # ------------------------------------------------------------------------------------- browsers
+    def open(self, browser: Any) -> Seat:
+        """Seat a browser."""
+        self._number += 1
+        number = f"b{self._number}"
+        loop = self._loop
+
+        def refuse(why: str) -> None:
+            loop.call_soon_threadsafe(_write, browser, {"kind": "refusal", "what": why})
+
+        seat = Seat(number, refuse)
+        self._browsers[number], self._sent[number] = browser, 0
+        self._session.sit(seat)
+        _write(browser, self._hello())
+        return seat
+
+    def left(self, seat: Seat) -> None:
+        """Let a browser go."""
+        self._browsers.pop(seat.number, None)
+        self._sent.pop(seat.number, None)
+        self._session.leave(seat)
+
+    def message(self, seat: Seat, text: str | bytes) -> None:
+        """Take what a browser sends."""
+        try:
+            message = json.loads(text)
+        except ValueError:
+            message = None
+        if isinstance(message, dict):
+            self._session.take(seat, message)
+
+    def _hello(self) -> dict[str, Any]:
+        machine = self._session.machine
+        limits = machine.limits
+        free = [AXES[k] for k in make_plant(machine).axes]
+        return {
+            "kind": "hello",
+            "machine": machine.name,
+            "axes": AXES,
+            "axes_free": free,
+            "actuators": machine.actuator_names,
+            "waves": WAVES,
+            "motions": [{"name": m.name, "title": m.title} for m in list_motions() if not m.remedy],
+            "limits": {name: getattr(limits, name) for name in ("displacement", "velocity", "acceleration")},
+            "trainer": self._trainer,
+            "view": "view/",
+        }
+
+    # ------------------------------------------------------------------------------------- state
+    def _look(self) -> None:
+        """Take what is new, and send it to all browsers."""
+        session = self._session
+        rows = session.look()
+        if len(rows):
+            self._last = rows[-1]
+            self._draw()
+        state = self._state(rows[::_EVERY])
+        for number, browser in list(self._browsers.items()):
+            seat, entries = session.seats[number], session.journal.entries
+            own: dict[str, Any] = {"you": {"id": number, "role": session.role(seat), "name": seat.name}}
+            own["log"] = entries[self._sent[number] :]
+            self._sent[number] = len(entries)
+            _write(browser, state | own)
+
+    def _draw(self) -> None:
+        of = self._session.layout.of
+        row = self._last[None]
+        struts = np.zeros(len(self._session.machine.struts))
+        force = np.concatenate([of(row, "actuator_force")[0], struts])
+        self._scene.draw(Snapshot(float(row[0, 0]) / SAMPLE_RATE, of(row, "platen_displacement")[0], force))
+
+    def _state(self, rows: Array) -> dict[str, Any]:
+        session, status = self._session, self._session.status
+        operator = session.operator
+        found: dict[str, Any] = {
+            "kind": "state",
+            "time": self._last[0] / SAMPLE_RATE,
+            "operator": operator.name if operator else None,
+            "watchers": len(session.seats) - (operator is not None),
+            "link": {
+                "ok": session.link == "on",
+                "word": session.link,
+                "late": session.missed / max(session.answered + session.missed, 1),
+                "samples": session.answered,
+            },
+            "pressure": status.pressure if status else "off",
+            "platen": status.platen if status else "parked",
+            "trip": (status and status.trip) or None,
+            "setpoint": status.setpoint if status else (0.0,) * 6,
+            "span": status.span if status else (0.0,) * 6,
+            "scale": status.scale if status else 1.0,
+            "recording": {"name": session.recording.name, "seconds": session.recording.seconds}
+            if session.recording
+            else None,
+            "recordings": session.recordings,
+            "faults": [],
+        }
+        time = float(self._last[3])
+        found["program"] = {
+            "name": status.program if status else None,
+            "state": status.state if status else "stopped",
+            "time": time,
+            "duration": status.duration if status else None,
+        }
+        if status is not None:
+            shares = session.layout.of(self._last[None], "shares")[0]
+            found["interlocks"] = [
+                {"name": name, "share": share, "limit": limit, "on": on, "where": where}
+                for name, share, limit, on, where in zip(
+                    INTERLOCKS, shares, status.limits, status.on, status.where, strict=True
+                )
+            ]
+            found["bars"] = self._bars()
+            found["scope"] = self._scope(rows)
+        plain: dict[str, Any] = jsonable(found)
+        return plain
+
+    def _bars(self) -> dict[str, dict[str, float]]:
+        of, row, names = self._session.layout.of, self._last[None], self._session.machine.actuator_names
+        force = of(row, "actuator_force")[0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = force / np.where(force < 0.0, self._capacity["actuator_pull"], self._capacity["actuator_force"])
+            limits = of(row, "platen_displacement")[0] / self._capacity["displacement"]
+        return {
+            "force": _named(names, share),
+            "spool": _named(names, of(row, "spool_command")[0]),
+            "limits": _named(AXES, limits),
+        }
+
+    def _scope(self, rows: Array) -> dict[str, Any]:
+        of = self._session.layout.of
+        names = {"reference": "reference_displacement", "feedback": "platen_displacement", "force": "actuator_force"}
+        names |= {"acceleration_reference": "reference_acceleration", "acceleration": "platen_acceleration"}
+        found: dict[str, Any] = {"t": np.round(rows[:, 0] / SAMPLE_RATE, 4).tolist()}
+        return found | {name: np.round(of(rows, column), 6).tolist() for name, column in names.items()}
+
+
+def _named(names: Any, shares: Array) -> dict[str, float]:
+    return {name: round(float(x), 4) for name, x in zip(names, shares, strict=True) if np.isfinite(x)}
+
+
+def _write(browser: Any, message: Mapping[str, Any]) -> None:
+    """Send a browser one message, unless it is closing."""
+    from tornado.websocket import WebSocketClosedError
+
+    try:
+        written = browser.write_message(json.dumps(message))
+    except WebSocketClosedError:
+        return
+    written.add_done_callback(lambda done: done.cancelled() or done.exception())
+
+
+def _handlers(server: PanelServer) -> list[Any]:
+    """Files of the page, and its websocket."""
+    from tornado.web import RequestHandler
+    from tornado.websocket import WebSocketHandler
+
+    class File(RequestHandler):
+        def get(self, name: str) -> None:
+            if not _admitted(self, server):
+                return
+            path = Path(__file__).with_name(name or "page.html")
+            self.set_header("Content-Type", f"{_TYPES[path.suffix]}; charset=utf-8")
+            self.set_header("Content-Security-Policy", _POLICY)
+            self.set_header("Cache-Control", "no-store")
+            self.set_header("X-Content-Type-Options", "nosniff")
+            self.finish(path.read_bytes())
+
+    class Socket(WebSocketHandler):  # tornado lets only pages of the same origin connect
+        seat: Seat | None = None
+
+        def prepare(self) -> None:
+            _admitted(self, server)
+
+        def open(self, *_: str, **__: str) -> None:
+            self.set_nodelay(True)
+            self.seat = server.open(self)
+
+        def on_message(self, message: str | bytes) -> None:
+            if self.seat is not None:
+                server.message(self.seat, message)
+
+        def on_close(self) -> None:
+            if self.seat is not None:
+                server.left(self.seat)
+
+    files = [path.name for path in Path(__file__).parent.iterdir() if path.suffix in _TYPES]
+    return [(f"/({'|'.join(map(re.escape, files))}|)", File), ("/socket", Socket)]
+
+
+def _guarded(server: PanelServer, rule: Any) -> Any:
+    """A handler of the view that needs the token, too."""
+    address, handler = rule
+
+    def prepare(asked: Any) -> None:
+        _admitted(asked, server)
+
+    return address, type("Guarded", (handler,), {"prepare": prepare})
+
+
+def _admitted(handler: Any, server: PanelServer) -> bool:
+    """Whether a request has the token, which is kept in a cookie; else it is answered with 403."""
+    given = handler.get_argument("token", None)
+    if server.allows(given or handler.get_cookie("lhpost6_panel")):
+        if given:
+            handler.set_cookie("lhpost6_panel", given, httponly=True, samesite="Strict")
+        return True
+    handler.set_status(403)
+    handler.finish("open the address that the panel printed, with its token")
+    return False

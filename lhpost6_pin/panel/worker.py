@@ -1,0 +1,244 @@
+"""The processes behind a panel: the controller in real time, and a plant of its own to command."""
+
+import logging
+import os
+import signal
+import threading
+from collections.abc import Mapping
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..control.settings import ControllerSettings
+from ..core.errors import LhpostError, LinkError, SimulationError
+from ..core.files import models_folder
+from ..interfaces.link import LinkClient, LinkMode, PlantState, Reading, ServedPlant, open_socket, serve
+from ..interfaces.link.clock import undisturbed
+from ..machine.machine import Machine
+from ..machine.parameters import Parameters, load_parameters
+from ..mechanics.equilibrium import find_equilibrium
+from ..mechanics.plant import make_plant
+from .engine import Engine, Status
+from .programs import Program, Recorded
+from .ring import Ring
+from .rows import Rows
+
+__all__ = ["Setup", "control", "panel_numbers", "rows_of", "serve_plant"]
+
+log = logging.getLogger(__name__)
+
+_IDLE, _SILENCE = (
+    0.1,
+    1.0,
+)  # [s] between looks at orders; without sensors until the link is lost
+_OFTEN = 64  # samples between looks at orders, and at what is to be shown
+_KEEP = 2048  # samples between signs of life to a server that is not commanded
+_MOST_UNSEEN = 16  # messages to the page that it has not taken, from which on the next ones wait
+
+
+class Setup(NamedTuple):
+    """What the controller is made of."""
+
+    machine: Machine
+    settings: ControllerSettings
+    parked: float | None  # height of a parked platen [m]
+    ring: Path
+
+
+class _Link:
+    """Messages to the page's process, which are never waited for: those that find no room are sent later."""
+
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe, self._unseen = pipe, 0
+        self._later: list[tuple[str, Any]] = []
+        self.orders: list[Mapping[str, Any]] = []
+
+    def say(self, kind: str, content: Any) -> None:
+        self._later.append((kind, content))
+
+    def look(self, seconds: float = 0.0) -> None:
+        """Take orders, and send what there is room for; raises EOFError once the page's process has ended."""
+        while self._pipe.poll(seconds):
+            taken = self._pipe.recv()
+            seconds = 0.0
+            if taken is None:
+                self._unseen -= 1
+            else:
+                self.orders.append(taken)
+        while self._later and self._unseen < _MOST_UNSEEN:
+            self._pipe.send(self._later.pop(0))
+            self._unseen += 1
+
+
+def panel_numbers() -> Parameters:
+    """Numbers of `models/procedures/panel.toml`."""
+    return load_parameters(models_folder() / "procedures" / "panel.toml")
+
+
+def rows_of(machine: Machine) -> Rows:
+    """Layout of a machine's rows."""
+    return Rows(len(machine.actuators), len(machine.struts), pressures=False)
+
+
+def control(pipe: Connection, setup: Setup) -> None:
+    """Run the controller until the other end of the pipe is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the page's process ends this one
+    link = _Link(pipe)
+    controller = _Controller(setup, link)
+    with suppress(EOFError, OSError):
+        while True:
+            controller.turn()
+
+
+class _Controller:
+    """The loop of the controller's process."""
+
+    def __init__(self, setup: Setup, link: _Link) -> None:
+        self._setup, self._link = setup, link
+        self._plant = make_plant(setup.machine)
+        self._rest = find_equilibrium(self._plant)
+        self._rows, self._numbers = rows_of(setup.machine), panel_numbers()
+        self._ring = Ring(setup.ring, self._rows.width)
+        self._engine: Engine | None = None
+        self._client: LinkClient | None = None
+        self._reading: Reading | None = None
+        self._shown: Status | None = None
+        self._counted = self._answered = self._kept = 0
+        link.say("ready", None)
+
+    def turn(self) -> None:
+        """Wait for orders, or run a session while there is one."""
+        self._link.look(_IDLE)
+        self._obey()
+        if self._client is not None:
+            with undisturbed():
+                self._session(self._client)
+
+    def _session(self, client: LinkClient) -> None:
+        """Answer sensors until the session ends."""
+        assert self._engine is not None
+        silent, turns = 0.0, 0
+        self._answer(client, self._engine)
+        while self._client is client:
+            commanded = self._engine.pressure == "high"
+            reading = client.wait(_IDLE if commanded else 0.02)
+            if reading is not None:
+                silent, self._reading = 0.0, reading
+                self._answer(client, self._engine)
+                turns += 1
+                if turns % _OFTEN and reading.state == PlantState.RUNNING:
+                    continue
+            elif commanded:
+                silent += _IDLE
+                if silent >= _SILENCE:
+                    self._link.say("lost", "the server does not answer any more")
+                    self._end()
+                    return
+            else:
+                client.keep()
+            self._look()
+
+    def _answer(self, client: LinkClient, engine: Engine) -> None:
+        assert self._reading is not None
+        command = engine.answer(self._reading)
+        if command is not None:
+            client.send(command)
+            self._answered += 1
+        elif engine.pressure == "high" and self._reading.sample - self._kept > _KEEP:
+            client.keep()
+            self._kept = self._reading.sample
+        self._ring.write(engine.row)
+
+    def _look(self) -> None:
+        """Take orders and show the state."""
+        if self._engine is not None and self._client is not None:
+            status = self._engine.status
+            if self._shown is None or status._replace(program_time=0.0) != self._shown:
+                self._shown = status._replace(program_time=0.0)
+                self._link.say("status", status)
+        self._link.look()
+        self._obey()
+
+    def _obey(self) -> None:
+        while self._link.orders:
+            order = self._link.orders.pop(0)
+            try:
+                self._do(order)
+            except LhpostError as error:
+                self._link.say("refusal", (order.get("by"), str(error)))
+            else:
+                self._link.say("done", order)
+
+    def _do(self, order: Mapping[str, Any]) -> None:
+        if order["do"] == "pressure" and order["to"] != "high":
+            if order["to"] == "off":
+                if self._engine is not None:
+                    self._engine.order(order)
+                self._end()
+                return
+            if self._client is None:
+                self._begin(str(order["host"]), int(order["port"]))
+                return
+        if self._engine is None:
+            raise SimulationError("the pressure is off; set it low, then high")
+        self._engine.order(order, _program_of(order))
+        if order["do"] in ("pressure", "reset") and self._client is not None:
+            self._answer(self._client, self._engine)  # a plant that waits for its first command sends nothing
+
+    def _begin(self, host: str, port: int) -> None:
+        self._client = LinkClient(host, port, tries=10)
+        wanted = self._setup.machine
+        found = self._client.machine, self._client.actuators
+        if found != (wanted.name, wanted.actuator_names):
+            self._client.close()
+            self._client = None
+            raise LinkError(f"the server's machine is {found[0]}, the panel's {wanted.name}; choose --machine")
+        if self._client.mode == LinkMode.LOCK_STEP:
+            self._client.close()
+            self._client = None
+            raise LinkError("the server runs in lock-step; start it with --mode real-time")
+        self._reading, self._kept, self._answered = self._client.reading, 0, 0
+        self._shown = None
+        self._engine = Engine(
+            self._plant, self._rest, self._setup.settings, self._numbers, self._setup.parked, self._rows
+        )
+        self._look()
+
+    def _end(self) -> None:
+        """End the session; counts of the server go to the page."""
+        if self._client is not None:
+            self._link.say("ended", (self._client.close(), self._answered, self._client.sensors_lost))
+        self._client = self._engine = self._shown = None
+
+
+def _program_of(order: Mapping[str, Any]) -> Program | None:
+    """The program that an order brings: a wave, or the name of a motion with the file of its rows."""
+    if order["do"] != "load":
+        return None
+    if "wave" in order:
+        wave: Program = order["wave"]
+        return wave
+    rows = np.load(order["file"], mmap_mode="r")
+    return Recorded(str(order["name"]), *rows)
+
+
+def serve_plant(pipe: Connection, machine: Machine) -> None:
+    """Serve a plant in real time until the other end of the pipe is closed; sends its address first."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    plant = make_plant(machine)
+    served = ServedPlant(plant, find_equilibrium(plant), LinkMode.REAL_TIME)
+    stop = threading.Event()
+
+    def wait() -> None:
+        with suppress(EOFError, OSError):
+            pipe.recv()
+        stop.set()
+
+    threading.Thread(target=wait, daemon=True).start()
+    with open_socket(port=0) as sock:
+        pipe.send(sock.getsockname())
+        serve(sock, served, stop=stop)
+    os._exit(0)

@@ -1,0 +1,401 @@
+"""A table that is driven by hand: moves, programs, the drive, interlocks and the controller, without processes."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lhpost6_pin.control import load_controller
+from lhpost6_pin.control.plug import Feedback
+from lhpost6_pin.core.errors import ControllerError, MotionError, OutOfRangeError
+from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.interfaces.link import Datagram, Kind, LinkMode, PlantState, Reading, ServedPlant, decode, encode
+from lhpost6_pin.interfaces.link.protocol import MOTION
+from lhpost6_pin.mechanics.coupled import motion_of_numbers
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.panel.demand import check_program
+from lhpost6_pin.panel.drive import Drive
+from lhpost6_pin.panel.engine import BLOCK, Engine
+from lhpost6_pin.panel.moves import Moved, at_rest, move_to
+from lhpost6_pin.panel.programs import Recorded, make_wave
+from lhpost6_pin.panel.recording import Recording, record_of_rows
+from lhpost6_pin.panel.ring import ROWS, Ring, RingReader
+from lhpost6_pin.panel.rows import Rows
+from lhpost6_pin.panel.worker import panel_numbers
+
+HIGHEST = 33.0
+NUMBERS = panel_numbers()
+number = st.floats(-10.0, 10.0)
+
+
+# --------------------------------------------------------------------------------------------- moves
+@pytest.mark.fast
+@given(st.tuples(number, number, number), number, st.floats(0.5, 5.0))
+def test_a_move_begins_in_the_motion_that_it_takes_over_and_ends_at_rest_at_its_target(start, target, seconds):
+    move = move_to(np.array([target]), 3.0, seconds, Moved(*(np.array([x]) for x in start)))
+    first = move.at(np.array([3.0]))
+    np.testing.assert_allclose(np.ravel(first), start, atol=1e-9 * max(1.0, *map(abs, start)))
+    just = move.at(np.array([3.0 + seconds * (1.0 - 1e-12)]))  # the polynomial itself, not what follows it
+    size = 1.0 + abs(target) + sum(abs(x) * seconds**k for k, x in enumerate(start))
+    assert abs(just.value[0, 0] - target) < 1e-9 * size
+    # the rate ends with its square, the acceleration linearly in what is left of the time
+    assert abs(just.rate[0, 0]) * seconds < 1e-9 * size
+    assert abs(just.acceleration[0, 0]) * seconds**2 < 1e-8 * size
+    late = move.at(np.array([100.0]))
+    assert late.value[0, 0] == target and late.rate[0, 0] == late.acceleration[0, 0] == 0.0
+
+
+@pytest.mark.fast
+def test_rates_of_a_move_are_the_derivatives_of_its_values():
+    move = move_to(np.array([0.4, -1.0]), 1.0, 2.0, Moved(np.array([0.0, 1.0]), np.array([0.3, 0.0]), np.zeros(2)))
+    time = np.linspace(1.0, 3.5, 5001)
+    moved = move.at(time)
+    for value, rate in ((moved.value, moved.rate), (moved.rate, moved.acceleration)):
+        # where the move ends its third derivative falls from 60 times the way over seconds^3: half a step of it
+        np.testing.assert_allclose(np.gradient(value, time, axis=0)[1:-1], rate[1:-1], atol=60 * 2.0 / 2.0**3 * 2.5e-4)
+
+
+# --------------------------------------------------------------------------------------------- programs
+@pytest.mark.fast
+@pytest.mark.parametrize(
+    "wave",
+    [("sine", {}), ("triangle", {}), ("sweep", {"to": 8.0, "duration": 5.0}), ("sweep", {"to": 0.1, "duration": 5.0})],
+)
+def test_a_wave_of_unit_amplitude_has_its_own_derivatives(wave):
+    kind, more = wave
+    found = make_wave(kind, axes=(0, 5), frequency=1.0, highest=HIGHEST, **more)
+    time = np.arange(0.0, 5.0, 1e-4)
+    moved = found.at(time)
+    assert not moved.value[:, [1, 2, 3, 4]].any() and np.array_equal(moved.value[:, 0], moved.value[:, 5])
+    assert 0.97 < np.abs(moved.value[:, 0]).max() <= 1.0 + 1e-12  # a triangle up to 33 Hz lacks 2.4 % of its tip
+    for value, rate in ((moved.value, moved.rate), (moved.rate, moved.acceleration)):
+        scale = np.abs(rate[:, 0]).max()
+        # central differences of the highest component, 33 Hz: (2 pi 33 step)^2 / 6
+        np.testing.assert_allclose(np.gradient(value[:, 0], time)[1:-1], rate[1:-1, 0], atol=1e-4 * scale)
+
+
+@pytest.mark.fast
+def test_a_sweep_ends_at_its_last_frequency():
+    found = make_wave("sweep", axes=(0,), frequency=0.5, highest=HIGHEST, to=8.0, duration=20.0)
+    rate, acceleration = (x[0, 0] for x in found.at(np.array([20.0]))[1:])
+    value = found.at(np.array([20.0])).value[0, 0]
+    assert np.hypot(rate, 0.0) == pytest.approx(2.0 * np.pi * 8.0 * np.sqrt(1.0 - value**2), rel=1e-6)
+    assert np.isfinite(acceleration)
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize(
+    "wrong, why",
+    [
+        ({"wave": "square"}, "no wave named 'square'"),
+        ({"axes": ()}, "needs an axis"),
+        ({"frequency": 0.0}, "frequency of 0 Hz"),
+        ({"frequency": 40.0}, "up to 33 Hz"),
+        ({"cycles": -1.0}, "number of cycles of -1"),
+        ({"wave": "sweep"}, "give all three"),
+        ({"wave": "sweep", "to": 0.5, "duration": 3.0}, "give all three"),
+        ({"wave": "sweep", "to": 2.0, "duration": float("inf")}, "duration of inf"),
+    ],
+)
+def test_waves_that_cannot_be_are_refused_with_the_reason(wrong, why):
+    given = {"wave": "sine", "axes": (0,), "frequency": 0.5, "highest": HIGHEST} | wrong
+    with pytest.raises(MotionError, match=why):
+        make_wave(given.pop("wave"), **given)
+
+
+def recorded(seconds: float = 4.0) -> Recorded:
+    """A burst along x and z."""
+    time = np.arange(round(seconds * SAMPLE_RATE) + 1) / SAMPLE_RATE
+    w, t = 2.0 * np.pi * 1.5, time[:, None]
+    ways = np.array([0.05, 0.0, 0.01, 0.0, 0.0, 0.0])
+    window, slope = np.sin(np.pi * t / seconds) ** 4, 4.0 * np.pi / seconds
+    s, c = np.sin(np.pi * t / seconds), np.cos(np.pi * t / seconds)
+    first = slope * s**3 * c
+    second = slope * np.pi / seconds * (3.0 * s**2 * c**2 - s**4)
+    d = window * np.sin(w * t)
+    v = first * np.sin(w * t) + window * w * np.cos(w * t)
+    a = second * np.sin(w * t) + 2.0 * first * w * np.cos(w * t) - window * w**2 * np.sin(w * t)
+    return Recorded("burst", d * ways, v * ways, a * ways)
+
+
+@pytest.mark.fast
+def test_a_recorded_motion_is_its_samples_and_smooth_between_them():
+    program = recorded()
+    at = program.at(np.arange(100) / SAMPLE_RATE)
+    for found, own in zip(at, (program.displacement, program.velocity, program.acceleration), strict=True):
+        np.testing.assert_allclose(found, own[:100], atol=1e-15)
+    between = program.at((np.arange(2000) + 0.5) / SAMPLE_RATE)
+    exact = recorded().at((np.arange(4000) + 1.0) / (2 * SAMPLE_RATE))
+    assert np.abs(between.value - exact.value[::2]).max() < 1e-12
+    assert program.duration == 4.0
+    beyond = program.at(np.array([-1.0, 9.0]))
+    np.testing.assert_allclose(beyond.value, program.displacement[[0, -1]], atol=1e-15)
+
+
+# --------------------------------------------------------------------------------------------- the drive
+def fly(drive: Drive, orders: dict[int, object], blocks: int) -> list[np.ndarray]:
+    """Reference of so many blocks, with orders before some of them."""
+    found = []
+    for k in range(blocks):
+        if k in orders:
+            orders[k](k * BLOCK)
+        found.append(drive.advance(k * BLOCK, BLOCK))
+    return [np.concatenate(x) for x in zip(*found, strict=True)]
+
+
+@pytest.mark.fast
+@pytest.mark.parametrize("kind", ["wave", "motion"])
+def test_the_reference_is_smooth_through_run_hold_span_setpoint_and_stop(kind):
+    drive = Drive(NUMBERS, np.full(6, 1.0), np.zeros(6))
+    program = make_wave("sine", axes=(0, 2), frequency=0.7, highest=HIGHEST) if kind == "wave" else recorded(30.0)
+    drive.set_span(np.array([0.1, 0.0, 0.03, 0.0, 0.0, 0.0]), 0)
+    drive.load(program)
+    place = np.array([0.05, -0.02, 0.0, 0.0, 0.0, 0.01])
+    orders = {
+        4: drive.run,
+        200: drive.hold,
+        330: drive.run,
+        460: lambda k: drive.set_span(np.array([0.05, 0.0, 0.06, 0.0, 0.0, 0.0]), k),
+        470: lambda k: drive.set_scale(0.4, k),
+        500: lambda k: drive.move_setpoint(place, k),
+        520: lambda k: drive.move_setpoint(2.0 * place, k),  # within the move before
+        700: drive.stop,
+    }
+    displacement, velocity, acceleration = fly(drive, orders, 1400)
+    for value, rate in ((displacement, velocity), (velocity, acceleration)):
+        slopes = np.gradient(value, 1.0 / SAMPLE_RATE, axis=0)
+        # where moves begin and end the third derivative changes by about 1 m/s3: half a step of it
+        assert np.abs(slopes - rate)[1:-1].max() < 0.5 / SAMPLE_RATE
+    assert (
+        np.abs(np.diff(acceleration, axis=0)).max() < 0.05
+    )  # no jump: 1.5 Hz of 0.1 m change by 0.04 a sample at most
+    np.testing.assert_allclose(displacement[-1], 2.0 * place, atol=1e-12)
+    assert drive.state(1400 * BLOCK).state == "stopped"
+    still = slice(330 * BLOCK - 50, 330 * BLOCK)  # held: two seconds are over
+    assert np.abs(velocity[still]).max() == 0.0 and np.abs(displacement[still, 0]).max() > 0.0
+
+
+@pytest.mark.fast
+def test_a_wave_of_so_many_cycles_ends_by_itself_and_a_motion_at_its_end():
+    for program in (make_wave("sine", axes=(1,), frequency=1.0, highest=HIGHEST, cycles=3.0), recorded()):
+        drive = Drive(NUMBERS, np.full(6, 1.0), np.zeros(6))
+        drive.set_span(np.full(6, 0.1), 0)
+        drive.load(program)
+        displacement, velocity, _ = fly(drive, {0: drive.run}, 900)
+        assert drive.state(900 * BLOCK).state == "stopped"
+        assert np.abs(displacement[-1]).max() < 1e-9 and not velocity[-1].any()
+        drive.run(900 * BLOCK)  # once more, from its beginning
+        assert drive.advance(900 * BLOCK, 2000).rate.any()
+
+
+@pytest.mark.fast
+def test_a_setpoint_is_approached_at_the_stated_share_of_the_velocity_limits():
+    speed = np.array([3.0, 2.0, 0.45, np.inf, np.inf, np.inf])
+    drive = Drive(NUMBERS, speed, np.zeros(6))
+    drive.move_setpoint(np.array([0.8, 0.1, 0.1, 0.0, 0.0, 0.0]), 0)
+    _, velocity, _ = fly(drive, {}, 2000)
+    share = np.abs(velocity).max(axis=0)[:3] / speed[:3]
+    assert share.max() == pytest.approx(NUMBERS.number("setpoint.speed"), rel=1e-4)  # of the slowest axis, at a sample
+
+
+# --------------------------------------------------------------------------------------------- the controller
+class Table:
+    """A served plant and the controller of a panel, joined by datagrams in one process."""
+
+    def __init__(self, machine):
+        self.plant = make_plant(machine)
+        rest = find_equilibrium(self.plant)
+        self.rows = Rows(len(machine.actuators), len(machine.struts), pressures=False)
+        self.engine = Engine(self.plant, rest, load_controller("lhpost6"), NUMBERS, None, self.rows)
+        self.served = ServedPlant(self.plant, rest, LinkMode.REAL_TIME)
+        self.n, self.sequence = len(machine.actuators), 0
+        self.recording = Recording("test")
+        self.reading = self._read(self.served.receive(encode(Datagram(Kind.HELLO, 7)), "here", 0)[-1])
+        self.engine.answer(self.reading)
+
+    def _read(self, datagram):
+        frame, n = decode(datagram), self.n
+        sensors = Feedback(frame.numbers[6 : 6 + n], frame.numbers[:6], frame.numbers[6 + n : 6 + 2 * n])
+        motion = motion_of_numbers(frame.numbers[-MOTION:])
+        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, motion)
+
+    def do(self, do, program=None, **more):
+        self.engine.order({"do": do, **more}, program)
+
+    def step(self, seconds=1.0 / SAMPLE_RATE):
+        for _ in range(round(seconds * SAMPLE_RATE)):
+            command = self.engine.answer(self.reading)
+            self.recording.add(self.engine.row[None].copy())
+            if command is not None:
+                self.sequence += 1
+                counts = self.served._valves
+                head = {"actuators": self.n, "valves": int(counts.sum()), "sequence": self.sequence}
+                frame = Datagram(Kind.COMMAND, 7, **head, numbers=np.repeat(command, counts))
+                self.served.receive(encode(frame), "here", 0)
+            if (datagram := self.served.tick(0)) is None:
+                return
+            self.reading = self._read(datagram)
+
+    def of(self, name):
+        return self.rows.of(self.recording.rows(), name)
+
+
+@pytest.fixture
+def table(machine):
+    found = Table(machine)
+    found.do("pressure", to="high")
+    return found
+
+
+def sine(axis: int = 0, frequency: float = 0.5):
+    return make_wave("sine", axes=(axis,), frequency=frequency, highest=HIGHEST)
+
+
+def test_the_platen_follows_a_wave_of_its_span_and_returns(table):
+    table.do("span", values=[0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    table.do("load", sine())
+    table.do("run")
+    table.step(8.0)
+    x, wanted = table.of("platen_displacement")[:, 0], table.of("reference_displacement")[:, 0]
+    assert np.abs(wanted).max() == pytest.approx(0.1, rel=1e-3)
+    assert np.sqrt(np.mean((x - wanted) ** 2)) < 0.1 * np.sqrt(np.mean(wanted**2))  # as the report's tests track
+    table.do("stop")
+    table.step(6.0)
+    assert abs(table.of("platen_displacement")[-1, 0]) < 1e-3 and table.engine.status.state == "stopped"
+    record = record_of_rows(table.recording.rows(), table.rows, table.plant.machine, {"test": "by hand"})
+    assert record.sizes["time"] == 14 * SAMPLE_RATE and record["answered"].values.all()
+    np.testing.assert_array_equal(record["platen_displacement"].values[:, 0], table.of("platen_displacement")[:, 0])
+
+
+@pytest.mark.parametrize(
+    "name, limit, wave",
+    [
+        ("displacement", 0.05, sine()),
+        ("velocity", 0.03, sine()),
+        ("acceleration", 0.02, sine()),
+        ("force", 0.02, sine()),
+        ("overturning", 0.02, sine()),
+        ("saturation", 0.5, None),
+    ],
+)
+def test_an_interlock_trips_to_safe_hold_within_five_milliseconds(table, name, limit, wave):
+    table.do("interlock", name=name, limit=limit)
+    table.do("span", values=[0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    if wave is None:  # a command that the valves cannot follow
+        table.engine._interlocks._spool = 0.02
+        wave = sine()
+    table.do("load", wave)
+    table.do("run")
+    passed = None
+    for _ in range(6 * SAMPLE_RATE):
+        table.step()
+        passed = table.reading.sample if table.engine.trip and passed is None else passed
+        if table.served.state == PlantState.HOLD:
+            break
+    assert table.served.state == PlantState.HOLD and name in table.engine.trip
+    shares = table.of("shares")
+    k = ["displacement", "velocity", "acceleration", "force", "overturning", "saturation"].index(name)
+    over = int(np.argmax(shares[:, k] > limit))  # the row in which it was seen
+    assert (len(shares) - over) / SAMPLE_RATE <= 5e-3
+    assert (shares[:over, k] <= limit).all()
+
+
+def test_after_a_trip_the_platen_comes_to_rest_and_is_taken_over_where_it_is(table):
+    table.do("span", values=[0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    table.do("load", sine())
+    table.do("run")
+    table.step(2.6)
+    table.do("trip", who="Anna")
+    table.step(2.0)
+    assert "by Anna" in table.engine.trip and table.served.state == PlantState.HOLD
+    assert np.abs(table.of("platen_velocity")[-1, 0]) < 5e-3  # spools at rest: leaks and bias remain
+    place = table.of("platen_displacement")[-1, 0]
+    assert abs(place) > 0.01
+    with pytest.raises(ControllerError, match="reset it first"):
+        table.do("run")
+    table.do("reset")
+    begin = len(table.recording.rows())
+    table.step(8.0)
+    x, acceleration = table.of("platen_displacement")[begin:, 0], table.of("platen_acceleration")[begin:, :3]
+    assert abs(x[0] - place) < 1e-3 and abs(x[-1]) < 1e-3
+    # no jerk where the controller takes over: an approach of 0.1 m in 2 s has 0.15 m/s2, and friction breaks loose
+    assert np.abs(acceleration).max() < 0.6
+    assert table.served.state == PlantState.RUNNING and table.engine.status.trip == ""
+
+
+def test_a_limit_that_is_still_passed_is_named_at_reset(table):
+    table.do("setpoint", values=[0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    table.step(3.0)
+    table.do("interlock", name="displacement", limit=0.05)
+    table.step(0.1)
+    assert "displacement of x" in table.engine.trip
+    with pytest.raises(ControllerError, match="still displacement of x"):
+        table.do("reset")
+    table.do("interlock", name="displacement", on=False)
+    table.do("reset")
+    table.step(0.1)
+    assert table.engine.trip == ""
+
+
+def test_orders_out_of_turn_are_refused_with_what_to_do(machine):
+    table = Table(machine)
+    for do, why in (("run", "pressure is not high"), ("hold", "nothing runs"), ("reset", "nothing has tripped")):
+        with pytest.raises(ControllerError, match=why):
+            table.do(do)
+    with pytest.raises(ControllerError, match="no order 'jump'"):
+        table.do("jump")
+    table.do("pressure", to="high")
+    with pytest.raises(ControllerError, match="no program"):
+        table.do("run")
+    with pytest.raises(ControllerError, match="above zero"):
+        table.do("interlock", name="force", limit=0.0)
+    table.do("load", sine())
+    table.do("run")
+    table.step(0.2)
+    for do, more in (("load", {"program": sine()}), ("pressure", {"to": "off"})):
+        with pytest.raises(ControllerError, match="stop it first"):
+            table.do(do, **more)
+
+
+def test_a_program_beyond_the_table_is_refused_before_it_runs(machine):
+    plant = make_plant(machine)
+    gain = np.array([0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    check_program(plant, sine(), gain, np.zeros(6))
+    with pytest.raises(OutOfRangeError, match="displacement"):
+        check_program(plant, sine(), gain, np.array([0.7, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    with pytest.raises(OutOfRangeError, match="velocity"):
+        check_program(plant, sine(frequency=3.0), gain, np.zeros(6))
+
+
+# --------------------------------------------------------------------------------------------- rows
+@pytest.mark.fast
+def test_a_ring_hands_over_every_row_once_and_counts_those_that_it_loses(tmp_path):
+    ring, width = Ring(tmp_path / "ring", 3), 3
+    reader = RingReader(tmp_path / "ring", width)
+    for k in range(10):
+        ring.write(np.full(width, float(k)))
+    np.testing.assert_array_equal(reader.read()[:, 1], np.arange(10.0))
+    assert reader.read().shape == (0, width) and reader.lost == 0
+    for k in range(ROWS + 5):
+        ring.write(np.full(width, float(k)))
+    found = reader.read()
+    assert len(found) == ROWS // 2 and reader.lost == ROWS + 5 - ROWS // 2
+    np.testing.assert_array_equal(found[:, 0], np.arange(ROWS + 5 - ROWS // 2, ROWS + 5))
+
+
+@pytest.mark.fast
+def test_samples_that_were_missed_repeat_the_row_before_and_a_new_session_is_another_record(machine):
+    layout = Rows(len(machine.actuators), len(machine.struts), pressures=False)
+    rows = np.zeros((8, layout.width))
+    rows[:, 0] = [0, 0, 1, 2, 5, 6, 0, 1]  # read twice before the first command; 3 and 4 missed; then another session
+    rows[:, layout.places["platen_displacement"].start] = np.arange(8.0)
+    record = record_of_rows(rows, layout, machine, {"test": "gaps"})
+    assert record.sizes["time"] == 7
+    assert record["answered"].values.tolist() == [1, 1, 1, 0, 0, 1, 1]
+    assert record["platen_displacement"].values[:, 0].tolist() == [0.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0]
+
+
+@pytest.mark.fast
+def test_moves_at_rest_stay():
+    assert np.array_equal(at_rest(np.array([1.0, 2.0]), 5.0).at(np.array([0.0, 5.0, 9.0])).value, [[1.0, 2.0]] * 3)

@@ -7,9 +7,10 @@ along a ramp as long as the hold was, at most as long as the one into it: smooth
 drops out again and again still commands. In lock-step, where time stands still between commands, the plant runs
 through the ramp at once.
 
-Faults. Each is a plant of its own, made before a client comes: to go over to it (`RunningPlant.with_plant`) takes
-0.25 ms of a sample's 0.49 ms on a computer of 2024, to make it would take ten samples. Two at once would need a plant
-for each pair, so one at a time is on.
+Faults. Each is a plant of its own, made before a client comes. To go over to it (`RunningPlant.with_plant`) takes
+0.25 ms on an idle core, twice as much on a busy one, beside the sample's own 0.1 to 0.25 ms: the one sample of a switch
+may be late in real time, usually by less than a sample, and is then counted as a missed deadline. Two faults at once
+would need a plant for each pair, so one at a time is on.
 """
 
 import logging

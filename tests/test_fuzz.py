@@ -342,10 +342,28 @@ FEW = st.integers(0, 3)
 def datagrams(draw, actuators: int, valves: int):
     """A frame of any kind, right or wrong in one or another of its fields, without CRC so that all of it is read."""
     n, m = draw(st.just(actuators) | st.integers(0, 255)), draw(st.just(valves) | st.integers(0, 255))
-    kind, session, sequence = draw(st.integers(1, 6)), draw(FEW), draw(FEW | U32)
-    fields = (b"LHP6", 1, kind, 0, draw(FEW), n, m, 0, session, sequence, draw(U32), draw(U64), draw(U64), 0, 0)
+    kind, session, sequence = draw(st.integers(1, 7)), draw(FEW), draw(FEW | U32)
+    flags, k = draw(st.sampled_from([0, 4])), draw(FEW)
+    fields = (
+        b"LHP6",
+        2,
+        kind,
+        0,
+        draw(FEW),
+        n,
+        m,
+        flags | k << 8,
+        session,
+        sequence,
+        draw(U32),
+        draw(U64),
+        draw(U64),
+        0,
+        0,
+    )
     head = struct.pack("<4s6BH3I2Q2I", *fields)
-    size = {2: 40 + 16 * n, 3: 8 * m, 4: 8 * (6 + 2 * n), 6: 96}.get(kind, 0)
+    sensors = 8 * (24 + 2 * n + (3 * n + k + 1) * (flags > 0))
+    size = {2: 40 + 16 * n, 3: 8 * m, 4: sensors, 6: 96, 7: 40}.get(kind, 0)
     numbers = struct.pack(f"<{size // 8}d", *[draw(FLOATS)] * (size // 8))
     datagram = bytearray(head + draw(st.just(numbers) | st.binary(min_size=size, max_size=size)))
     if draw(st.booleans()):

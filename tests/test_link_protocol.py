@@ -35,8 +35,11 @@ EXAMPLES = [
     Datagram(Kind.SENSORS, 7, LinkMode.REAL_TIME, PlantState.HOLD, 1, 1, 9, 8, 5, 6, np.arange(26.0)),
     Datagram(Kind.BYE, 7),
     Datagram(Kind.STATUS, 7, counts=tuple(range(12))),
+    Datagram(Kind.SWITCH, 7, fault="entrained_air@H1", on=True),
+    Datagram(Kind.HELLO, 7, pressures=True),
+    Datagram(Kind.SENSORS, 7, actuators=2, numbers=np.arange(38.0), pressures=True, struts=3),
 ]
-"""One frame of each kind."""
+"""One frame of each kind, and those that ask for pressures and carry them."""
 
 
 def same(a: Datagram, b: Datagram) -> bool:
@@ -89,6 +92,32 @@ def test_a_command_with_a_wrench_sets_its_flag_and_has_six_numbers_more():
         encode(Datagram(Kind.COMMAND, 7, actuators=2, valves=2, numbers=values[:7]))
 
 
+def test_sensors_with_pressures_are_laid_out_as_the_table_says_and_others_as_before():
+    """Bit 2 of flags and k in its upper byte; after the motion of the interface 3 n + k + 1 numbers."""
+    asked, given, plain = (encode(EXAMPLES[k]) for k in (7, 8, 3))
+    assert struct.unpack_from("<H", asked, 10) == (0b101,) and len(asked) == 48
+    assert struct.unpack_from("<H", given, 10) == (3 << 8 | 0b101,) and len(given) == 48 + 8 * (6 + 4 + 18 + 6 + 3 + 1)
+    assert struct.unpack_from("<38d", given, 48) == tuple(range(38))
+    assert struct.unpack_from("<H", plain, 10) == (1,) and len(plain) == 48 + 8 * 26
+    with pytest.raises(LinkError, match="sensors frame of 2 actuators"):
+        encode(EXAMPLES[8]._replace(struts=2))
+
+
+def test_a_switch_written_by_hand_from_the_layout_is_a_frame():
+    datagram = bytearray(48 + 40)
+    datagram[0:6] = b"LHP6\x02\x07"
+    datagram[48:64], datagram[87] = b"entrained_air@H1", 1
+    frame = decode(bytes(datagram))
+    assert (frame.kind, frame.fault, frame.on) == (Kind.SWITCH, "entrained_air@H1", True)
+    datagram[87] = 2
+    with pytest.raises(LinkError, match="switched to 2"):
+        decode(bytes(datagram))
+    longest = Datagram(Kind.SWITCH, 0, fault="é" * 19 + "a")
+    assert decode(encode(longest)).fault == longest.fault
+    with pytest.raises(LinkError, match="at most 39 bytes"):  # cut, it might be the name of another
+        encode(longest._replace(fault="é" * 20))
+
+
 def test_a_client_of_version_1_is_told_in_frames_of_its_own_which_version_is_needed():
     """Decoded by the layout of version 1: a machine without actuators whose name is the message."""
     welcome, sensors = refusal(77)
@@ -128,7 +157,7 @@ def test_bytes_after_a_right_beginning_are_a_frame_or_refused(frame, data):
     assert found.numbers is None or np.isfinite(found.numbers).all()
 
 
-@pytest.mark.parametrize("frame", EXAMPLES, ids=lambda f: f.kind.name)
+@pytest.mark.parametrize("frame", EXAMPLES, ids=lambda f: f.kind.name + "_with_pressures" * f.pressures)
 def test_a_frame_comes_back_cut_short_is_short_and_too_long_or_with_a_changed_bit_is_refused(frame):
     datagram = encode(frame)
     assert same(decode(datagram), frame)
@@ -145,7 +174,7 @@ def test_a_frame_comes_back_cut_short_is_short_and_too_long_or_with_a_changed_bi
 
 
 @pytest.mark.parametrize(
-    "offset, value, word", [(0, 65, "begins"), (4, 1, "version 1; version 2 is needed"), (5, 7, "kind 7"), (5, 0, "0")]
+    "offset, value, word", [(0, 65, "begins"), (4, 1, "version 1; version 2 is needed"), (5, 8, "kind 8"), (5, 0, "0")]
 )
 def test_what_is_wrong_with_a_header_is_said(offset, value, word):
     datagram = bytearray(encode(EXAMPLES[0]))

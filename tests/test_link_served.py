@@ -4,13 +4,18 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from machine_cases import plant_named
 
 from lhpost6_pin.control import load_controller, make_controller
 from lhpost6_pin.control.plug import Feedback
+from lhpost6_pin.core.errors import LinkError, ParameterError, SimulationError, UnknownNameError
 from lhpost6_pin.interfaces.link.clock import Histogram
+from lhpost6_pin.interfaces.link.faults import make_faults
 from lhpost6_pin.interfaces.link.protocol import COUNTS, Datagram, Kind, LinkMode, PlantState, decode, encode
 from lhpost6_pin.interfaces.link.served import MISSED_FRAMES, PATIENCE, RAMP, SESSION, ServedPlant
+from lhpost6_pin.machine.library import find_family
 from lhpost6_pin.mechanics.coupled import motion_numbers, wrench_of
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium, parked_pose
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.running import RunningPlant
 
@@ -24,18 +29,24 @@ MOVING = [LinkMode.REAL_TIME, LinkMode.FREE]
 class Client:
     """The client's side of a served plant, in the same process and on a clock of its own."""
 
-    def __init__(self, plant, rest, mode, session=1, name="a"):
-        self.table = ServedPlant(plant, rest, mode)
+    def __init__(self, plant, rest, mode, session=1, name="a", **more):
+        self.table = ServedPlant(plant, rest, mode, **more)
         self.session, self.name, self.sequence, self.now = session, name, 0, 0
 
     def say(self, frame, sender=None):
         """Hand a frame to the plant; returns its answers."""
         return [decode(d) for d in self.table.receive(encode(frame), sender or self.name, self.now)]
 
-    def hello(self, session=None):
+    def hello(self, session=None, pressures=False):
         """Begin a session; returns welcome and sensors."""
         self.session, self.sequence = session or self.session, 0
-        return self.say(Datagram(Kind.HELLO, self.session))
+        return self.say(Datagram(Kind.HELLO, self.session, pressures=pressures))
+
+    def switch(self, fault="", on=False):
+        """Switch a fault, or only ask; returns those that are offered and whether they are on."""
+        answers = self.say(Datagram(Kind.SWITCH, self.session, fault=fault, on=on))
+        assert {a.kind for a in answers} == {Kind.SWITCH}
+        return {a.fault: a.on for a in answers}
 
     def frame(self, spool, sequence=None):
         """Frame of the next command, or of one with a sequence number of its own."""
@@ -321,6 +332,116 @@ def test_a_client_that_is_silent_too_long_loses_its_place_and_the_plant_stands(c
     assert client.table.client is None and client.table.tick(0) is None
     assert client.say(client.frame(rest.spool)) == [] and client.table.counts["foreign"] == 1
     assert len(client.hello(session=2)) == 2
+
+
+# ------------------------------------------------------------------------------------- pressures, faults, parked
+@pytest.mark.parametrize("mode", MODES)
+def test_pressures_are_those_of_the_plant_for_the_session_that_asks_and_for_no_other(plant, rest, mode):
+    client, own = Client(plant, rest, mode), RunningPlant(plant, rest)
+    _, found = client.hello(pressures=True)
+    for spool in (*spools(rest, 20), None):
+        assert found.pressures and found.struts == 3
+        assert np.array_equal(found.numbers[44:], np.hstack(own.pressures()))
+        if spool is not None:
+            found = client.command(spool)
+            own.advance(spool)
+    b = found.numbers[54:64]
+    assert np.all(b[4:] == 0.0) and b[:4].min() > plant.supply[1]  # vertical actuators have chamber A only
+    _, found = client.hello(1)  # once more without asking: it is the session's first hello that counts
+    assert found.pressures
+    _, found = client.hello(2)
+    assert not found.pressures and client.command(rest.spool).numbers.shape == (44,)
+
+
+@pytest.fixture(scope="module")
+def faults(plant):
+    return make_faults(plant.machine, ["stribeck_friction@H1", "entrained_air@V1,V2"])
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_fault_acts_from_the_next_sample_on_one_at_a_time_and_never_in_a_new_session(plant, rest, mode, faults):
+    client, own = Client(plant, rest, mode, faults=faults), RunningPlant(plant, rest)
+    client.hello()
+    rub, air = faults
+    none = dict.fromkeys(faults, False)
+    plan = {5: (rub, True), 6: (rub, True), 12: (air, True), 14: (rub, False), 15: ("dust", True), 20: (air, False)}
+    on = ""
+    assert client.switch() == none
+    for k, spool in enumerate(spools(rest, 30)):
+        if k in plan:
+            name, wanted = plan[k]
+            now = {5: rub, 6: rub, 12: air, 14: air, 15: air, 20: ""}[k]
+            assert client.switch(name, wanted) == {**none, **({now: True} if now else {})}
+            if now != on:
+                on, own = now, own.with_plant(faults[now] if now else plant)
+        found = client.command(spool)
+        own.advance(spool)
+        assert all(np.array_equal(a, b) for a, b in zip(sensors_of(found), own.sensors(), strict=True))
+    client.switch(rub, True)
+    client.command(rest.spool)
+    assert client.hello()[1].sequence == 31 and client.switch()[rub]  # hello again: the same session
+    client.hello(2)
+    assert client.switch() == none
+    healthy = RunningPlant(plant, rest)
+    for spool in spools(rest, 10):
+        healthy.advance(spool)
+        found = client.command(spool)
+    assert np.array_equal(sensors_of(found).force, healthy.sensors().force)
+
+
+def test_switches_are_answered_where_nothing_is_offered_and_change_nothing_for_others_or_after_a_trip(
+    plant, rest, faults
+):
+    bare = Client(plant, rest, LinkMode.LOCK_STEP)
+    bare.hello()
+    assert bare.switch("stribeck_friction@H1", True) == {"": False}
+    client = Client(plant, rest, LinkMode.LOCK_STEP, faults=faults)
+    client.hello()
+    frame = Datagram(Kind.SWITCH, client.session, fault="stribeck_friction@H1", on=True)
+    assert client.say(frame, sender="b") == client.say(frame._replace(session=9)) == []
+    assert client.table.counts["foreign"] == 2 and client.table.fault == ""
+    client.table.state = PlantState.TRIPPED
+    assert not any(client.switch("stribeck_friction@H1", True).values())
+
+
+def test_a_fault_that_cannot_be_switched_is_refused_before_a_client_comes(plant, rest):
+    with pytest.raises(LinkError, match="at most 39 bytes"):
+        ServedPlant(plant, rest, LinkMode.FREE, faults={"x" * 40: plant})
+    with pytest.raises(LinkError, match="needs a name"):
+        ServedPlant(plant, rest, LinkMode.FREE, faults={"": plant})
+    with pytest.raises(SimulationError, match="the same machine"):
+        ServedPlant(plant, rest, LinkMode.FREE, faults={"x": plant_named("uniaxial")})
+    for name, why in (("@H1", "write EFFECT@WHERE"), ("entrained_air@", "EFFECT@WHERE"), ("entrained_air@S1", "H1")):
+        with pytest.raises(ParameterError, match=why):
+            make_faults(plant.machine, [name])
+    with pytest.raises(UnknownNameError, match="dust"):
+        make_faults(plant.machine, ["dust@H1"])
+
+
+def test_without_a_place_a_fault_is_on_all_components_and_of_typical_size(plant):
+    (made,) = make_faults(plant.machine, ["entrained_air"]).values()
+    assert np.array_equal(made.actuators.air, np.full(10, find_family("entrained_air").shapes[0].typical))
+    (alone,) = make_faults(plant.machine, ["entrained_air@V2"]).values()
+    assert np.flatnonzero(alone.actuators.air).tolist() == [5]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_parked_platen_stays_where_it_is_in_safe_hold(plant, mode):
+    parked = find_equilibrium(plant, parked_pose(plant.machine))
+    client = Client(plant, parked, mode)
+    _, found = client.hello()
+    low = plant.machine.platen.parked
+    # rounding of positions of some metres, and of 4 MN of weight on oil of 1 GN/m: far below a nanometre
+    assert sensors_of(found).displacement[4:] == pytest.approx(np.full(6, low), abs=1e-9)
+    client.command(parked.spool)
+    for _ in range(2 * RAMP):
+        if mode == LinkMode.LOCK_STEP:
+            client.table.watch(int(1.1 * PATIENCE * SECOND))
+            found = client.hello()[1]
+        else:
+            found = client.tick()
+    assert found.state == PlantState.HOLD and np.array_equal(client.table.spool, parked.spool)
+    assert sensors_of(found).displacement[4:] == pytest.approx(np.full(6, low), abs=1e-9)
 
 
 # ------------------------------------------------------------------------------------------------ statistics

@@ -19,23 +19,31 @@ from run_cases import amid_ridgecrest, at_rest
 from test_scripts import script
 
 from lhpost6_pin.control import load_controller, make_controller
+from lhpost6_pin.core.checksum import with_crc
 from lhpost6_pin.core.errors import LinkError, SimulationError
 from lhpost6_pin.data.records import load_record, save_record
 from lhpost6_pin.interfaces.link import (
     HOST,
+    Datagram,
     Kind,
     LinkClient,
     LinkMode,
     PlantState,
     ServedPlant,
+    Timing,
+    decode,
+    encode,
+    make_faults,
     open_socket,
     record_of_link_run,
     run_over_link,
     serve,
 )
+from lhpost6_pin.interfaces.link.clock import Histogram
 from lhpost6_pin.interfaces.link.remote import LinkRun
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.coupled import BaseMotion
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium, parked_pose
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.simulation.simulate import ClosedLoop, PluggedLoop, simulate
@@ -50,7 +58,7 @@ GUARD = 60.0  # [s] no wait is meant to last so long
 @contextmanager
 def served(plant, rest, mode=LinkMode.LOCK_STEP, **options):
     """Serve a plant in a thread; yields the served plant and its address."""
-    table, stop = ServedPlant(plant, rest, mode), threading.Event()
+    table, stop = ServedPlant(plant, rest, mode, faults=options.pop("faults", None)), threading.Event()
     with open_socket(port=0) as sock:
         thread = threading.Thread(target=serve, args=(sock, table), kwargs={"stop": stop, **options})
         thread.start()
@@ -234,6 +242,72 @@ def test_the_newest_sensors_can_be_had_without_waiting(plant, rest):
         assert found is client.reading and found.sample >= 1
 
 
+# ---------------------------------------------------------------------------------------- pressures, faults, parked
+@pytest.mark.parametrize("mode", MODES)
+def test_a_client_that_asks_for_pressures_reads_them_and_another_does_not(plant, rest, mode):
+    with served(plant, rest, mode) as (_, address):
+        with LinkClient(*address, pressures=True) as client:
+            for _ in range(3):
+                found, area = client.reading.pressures, plant.machine.actuators[0].area_a
+                force = found.a[0] * area - found.b[0] * plant.machine.actuators[0].area_b
+                # the same products: rounding of 4 MN
+                assert force == pytest.approx(client.reading.sensors.force[0], rel=1e-12, abs=1e-6)
+                assert [len(x) for x in found[:4]] == [10, 10, 10, 3] and not found.b[4:].any()
+                assert found.supply == plant.supply.pressure
+                client.exchange(rest.spool + 0.01)
+            assert client.reading.motion.pose.translation.shape == (3,)
+        with LinkClient(*address) as client:
+            assert client.reading.pressures is None and client.exchange(rest.spool).pressures is None
+
+
+def test_a_client_that_asks_a_server_that_knows_neither_pressures_nor_faults_goes_without(plant, rest, monkeypatch):
+    """Such a server overlooks the bit and counts a switch as malformed."""
+    answer = ServedPlant.receive
+
+    def older(self, datagram, sender, now):
+        if datagram[5] == Kind.SWITCH:
+            self.counts["malformed"] += 1
+            return []
+        return answer(self, with_crc(datagram[:10] + b"\1\0" + datagram[12:], 40), sender, now)
+
+    monkeypatch.setattr(ServedPlant, "receive", older)
+    with served(plant, rest) as (_, address), LinkClient(*address, pressures=True) as client:
+        client.ask_faults()
+        assert client.exchange(rest.spool).pressures is None and client.faults == {}
+        assert client.close()["malformed"] == 1
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_client_switches_faults_and_is_told_which_are_on(plant, rest, mode):
+    offered = make_faults(plant.machine, ["local_viscous@H1", "piston_leakage"])
+    with served(plant, rest, mode, faults=offered) as (table, address), LinkClient(*address) as client:
+        assert client.faults == {}
+        client.ask_faults()
+        while len(client.faults) < 2:
+            client.exchange(rest.spool)
+        assert client.faults == {"local_viscous@H1": False, "piston_leakage": False}
+        client.switch("piston_leakage", True)
+        while not client.faults["piston_leakage"]:
+            client.exchange(rest.spool)
+        assert table.fault == "piston_leakage" and not client.faults["local_viscous@H1"]
+        client.switch("dust", True)
+        client.switch("piston_leakage", False)
+        while client.faults["piston_leakage"]:
+            client.exchange(rest.spool)
+        assert table.fault == "" and client.ignored == 0
+        with pytest.raises(LinkError, match="at most 39 bytes"):
+            client.switch("x" * 40, True)
+
+
+def test_a_run_over_the_link_does_not_begin_at_a_parked_platen(plant):
+    parked = find_equilibrium(plant, parked_pose(plant.machine))
+    with served(plant, parked) as (_, address), LinkClient(*address) as client:
+        low = client.reading.motion.pose.translation
+        assert low == pytest.approx([0.0, 0.0, plant.machine.platen.parked], abs=1e-12)  # rounding of a metre
+        with pytest.raises(LinkError, match=r"platen is parked.*without --parked"):
+            run_over_link(client, plant, PluggedLoop(Proportional(), *wanted(10), parked))
+
+
 # ------------------------------------------------------------------------------------------------ who may connect
 def test_nothing_listens_beyond_this_computer_unless_asked():
     assert HOST == "127.0.0.1"
@@ -360,6 +434,18 @@ def test_a_server_says_where_it_listens_and_what_it_met(lhpost6, mode):
     assert "missed deadlines" in ended.words and "malformed" in ended.words
 
 
+def test_a_parked_table_with_faults_is_served_from_the_command_line(lhpost6, monkeypatch):
+    made, none = [], Timing(Histogram(), Histogram())
+    monkeypatch.setattr("lhpost6_pin.interfaces.link.serve", lambda sock, table, **_: made.append(table) or none)
+    given = ("--parked", "--fault", "entrained_air@H1", "--fault", "piston_leakage@V1,V2")
+    ended = lhpost6("serve", *given, "--port", 0, "--seconds", 0, "--json")
+    assert ended.code == 0, ended
+    (table,) = made
+    assert list(table.faults) == ["entrained_air@H1", "piston_leakage@V1,V2"] and table.fault == ""
+    hello = decode(table.receive(encode(Datagram(Kind.HELLO, 1)), "a", 0)[1])
+    assert hello.numbers[6 + 4 : 6 + 10] == pytest.approx(np.full(6, -0.12), abs=1e-9)  # rounding of metres
+
+
 def test_a_motion_runs_across_processes_and_leaves_its_record(tmp_path, lhpost6):
     command = [sys.executable, "-c", SERVE.format(["serve", "--port", "0", "--seconds", str(GUARD)])]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
@@ -398,6 +484,9 @@ def test_a_users_own_controller_can_take_the_place_of_the_469d(tmp_path, lhpost6
 def test_what_cannot_be_done_is_said_and_ends_with_two(lhpost6, port):
     assert refused(lhpost6("serve", "--port", port), f"cannot listen on 127.0.0.1:{port}")
     assert refused(lhpost6("serve", "--mode", "fast"), "free, lock-step, real-time")
+    assert refused(lhpost6("serve", "--parked", "--machine", "uniaxial"), "uniaxial.toml: platen.parked is missing")
+    assert refused(lhpost6("serve", "--fault", "dust@H1", "--port", 0), "no effect of the library named 'dust'")
+    assert refused(lhpost6("serve", "--fault", "@H1", "--port", 0), "EFFECT@WHERE, such as entrained_air@H1")
     assert refused(lhpost6("link", *SHORT, "--port", port, "--valves", 2), "choose --valves alike")
 
 

@@ -5,18 +5,20 @@ import pytest
 from machine_cases import MACHINES, PENDULUM, machine_named, plant_named
 from run_cases import at_rest
 
-from lhpost6_pin.core.errors import SimulationError
+from lhpost6_pin.core.errors import ParameterError, SimulationError
 from lhpost6_pin.core.names import ENGINES, SCHEMES
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.registry import parameters_of
 from lhpost6_pin.machine.machine import Machine
 from lhpost6_pin.mechanics import kinematics as kin
 from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
-from lhpost6_pin.mechanics.equilibrium import find_equilibrium, rest_pressures
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium, parked_pose, rest_pressures
+from lhpost6_pin.mechanics.instant import displacement_of, wrench_at
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
 from lhpost6_pin.mechanics.schemes import A
 from lhpost6_pin.mechanics.workspace import make_workspace
+from lhpost6_pin.simulation.running import RunningPlant
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 
 LHPOST6 = machine_named("lhpost6")
@@ -154,6 +156,46 @@ def test_rest_of_a_stewart_platform_carries_its_weight_through_the_legs():
     }
     assert np.abs(kin.external_wrench(machine, np.zeros(6), forces)).max() < 1e-9  # Eq. 4-30, of 6e4 N
     assert np.all(rest.force > 0.0)
+
+
+@pytest.mark.parametrize("bodies", ["lumped", "full"])
+@pytest.mark.parametrize("pose", [(0, 0, -0.12, 0, 0, 0), (0.3, -0.1, 0.05, 0.01, -0.005, 0.02)])
+def test_a_platen_at_rest_in_another_pose_stays_there(bodies, pose):
+    """Held by the spools found; the wrench of its actuators on the platen is that of Eq. 4-23 at the pose."""
+    plant = make_plant(LHPOST6.with_bodies(bodies))
+    rest = find_equilibrium(plant, pose)
+    assert displacement_of(rest.pose) == pytest.approx(pose, abs=1e-15)
+    at_c = wrench_at(plant, rest.pose, rest.force)
+    assert at_c.vector == pytest.approx(rest.wrench.vector, rel=1e-12, abs=1e-6)  # rounding of MN
+    table = RunningPlant(plant, rest)
+    for _ in range(200):
+        table.advance(rest.spool)
+    # rounding of 4 MN over 170 t in 0.1 s, of metres, of MN
+    assert np.abs(table.state.v).max() < 1e-9 and np.abs(table.state.q - rest.state.q).max() < 1e-9
+    assert table.sensors().force == pytest.approx(rest.force, rel=1e-9)
+
+
+def test_the_zero_position_is_the_pose_without_one_and_poses_that_cannot_be_are_refused():
+    plant, guided = plant_named("lhpost6"), plant_named("biaxial")
+    for found, same in zip(find_equilibrium(plant).state, find_equilibrium(plant, np.zeros(6)).state, strict=True):
+        assert np.array_equal(found, same)
+    assert find_equilibrium(guided, (0.05, -0.02, 0, 0, 0, 0)).state.q == pytest.approx([0.05, -0.02], abs=0.0)
+    with pytest.raises(SimulationError, match="biaxial cannot move in z; give 0"):
+        find_equilibrium(guided, (0, 0, 0.01, 0, 0, 0))
+    with pytest.raises(SimulationError, match=r"out of its stroke in pose 0, 0, 0\.3, 0, 0, 0 m, rad"):
+        find_equilibrium(plant, (0, 0, 0.3, 0, 0, 0))
+    for bad in ((0, 0), np.full(6, np.nan)):
+        with pytest.raises(SimulationError, match="six finite numbers"):
+            find_equilibrium(plant, bad)
+
+
+def test_the_parked_pose_is_stated_by_the_machine_that_has_one():
+    assert parked_pose(LHPOST6).tolist() == [0.0, 0.0, LHPOST6.platen.parked, 0.0, 0.0, 0.0]
+    vertical = next(a for a in LHPOST6.actuators if a.mount == "bearing")
+    assert -vertical.stroke < LHPOST6.platen.parked < 0.0
+    for name in ("uniaxial", "hexapod"):
+        with pytest.raises(ParameterError, match=rf"{name}\.toml.*: platen\.parked is missing"):
+            parked_pose(machine_named(name))
 
 
 @pytest.mark.parametrize("name", MACHINES)

@@ -17,6 +17,9 @@ from lhpost6_pin.data.records import load_record
 from lhpost6_pin.interfaces.link.protocol import Datagram, Kind, LinkMode, encode
 from lhpost6_pin.interfaces.link.served import ServedPlant
 from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.coupled import rigid_wrench
+from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.show.viewer import LiveView
 from lhpost6_pin.simulation.outputs import record_of_run
@@ -145,6 +148,99 @@ def test_a_leg_that_leaves_its_stroke_stops_the_table_by_name(plant, rest):
     with pytest.raises(SimulationError, match=r"stopped at \d\.\d+ s: V\d left its stroke of \+-0.127 m"):
         for _ in range(4 * SAMPLE_RATE):
             table.advance(up)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_table_goes_on_with_the_same_plant_to_the_last_bit(plant, rest, scheme):
+    """Also amid a motion with a wrench from outside, and the one that it came from is not disturbed."""
+    table = RunningPlant(plant, rest, scheme=scheme, steps_per_second=8 * SAMPLE_RATE)
+    push = pin.Force(np.array([1e5, 2e4, -1e5, 1e4, 0.0, 3e4]))
+    wave = rest.spool + 0.1 * np.sin(0.02 * np.arange(300))[:, None]
+    for k in range(100):
+        table.advance(wave[k], (0.01 * k) * push if k % 3 == 0 else None)
+    other = table.with_plant(make_plant(plant.machine))
+    assert all(np.array_equal(a, b) for a, b in zip(other.sensors(), table.sensors(), strict=True))
+    for k in range(100, 300):
+        for one in (table, other):
+            one.advance(wave[k], (0.01 * k) * push if k % 3 == 0 else None)
+        assert all(np.array_equal(a, b) for a, b in zip(other.state, table.state, strict=True))
+    assert all(np.array_equal(a, b) for a, b in zip(other.pressures(), table.pressures(), strict=True))
+    assert np.abs(table.state.v).max() > 1e-2 and (other.sample, other.clipped) == (300, table.clipped)
+
+
+EFFECTS = {  # a force, two that are states of the oil, one that lengthens the memory of commands
+    "local_viscous": {"coefficient": 2e5},
+    "entrained_air": {},
+    "line_dynamics": {},
+    "transport_delay": {"delay": 0.01},
+}
+
+
+@pytest.mark.parametrize("family", EFFECTS)
+def test_an_effect_that_is_switched_on_changes_the_motion_from_then_on_and_the_platen_goes_on(plant, rest, family):
+    machine = plant.machine.with_effect(family, ["H1"], **EFFECTS[family])
+    along = np.array([-1, -1, 1, 1, 0, 0, 0, 0, 0, 0])  # X
+    table, wave = RunningPlant(plant, rest), rest.spool + 0.1 * np.outer(np.sin(0.02 * np.arange(500)), along)
+    for k in range(200):
+        table.advance(wave[k])
+    other = table.with_plant(make_plant(machine))
+    before, after = table.state, other.state
+    assert np.array_equal(before.q, after.q) and np.array_equal(before.v, after.v)
+    assert np.array_equal(other.sensors().force, table.sensors().force)  # pressures go on
+    new = set(other.plant.states) - set(plant.states)
+    assert all(after.z[other.plant.states.index(name)] == 0.0 for name in new)
+    assert bool(new) == (family == "line_dynamics")
+    for k in range(200, 500):
+        other.advance(wave[k])
+        table.advance(wave[k])
+    apart = np.abs(other.interface_motion().pose.translation - table.interface_motion().pose.translation).max()
+    assert 1e-7 < apart < 0.02  # m: more than rounding, less than the motion itself
+    back = other.with_plant(plant)
+    assert back.plant is plant and np.array_equal(back.state.q, other.state.q) and back.state.z.shape == before.z.shape
+
+
+def test_a_plant_of_another_size_is_refused_and_so_is_a_specimen_that_is_a_program(plant, rest):
+    table = RunningPlant(plant, rest)
+    for machine in (machine_named("uniaxial"), plant.machine.with_specimen(PENDULUM)):
+        with pytest.raises(SimulationError, match="a plant of the same machine and specimen"):
+            table.with_plant(make_plant(machine))
+    coupled = make_plant(plant.machine.with_specimen(Mass()))
+    with pytest.raises(SimulationError, match="while a specimen is a program"):
+        table.with_plant(coupled)
+    with pytest.raises(SimulationError, match="starts in the zero-position"):
+        find_equilibrium(coupled, (0, 0, -0.1, 0, 0, 0))
+
+
+class Mass:
+    """A mass of one tonne, rigidly attached."""
+
+    inertia = pin.Inertia(1e3, np.zeros(3), np.eye(3))
+
+    def init(self, base, gravity):
+        return gravity, rigid_wrench(self.inertia, base, gravity)
+
+    def step(self, gravity, base, dt):
+        return rigid_wrench(self.inertia, base, gravity)
+
+
+def test_pressures_give_the_forces_and_those_of_the_struts_the_hold_down(plant, rest):
+    table = RunningPlant(plant, rest)
+    for k in range(200):
+        table.advance(rest.spool + 0.1 * np.sin(0.02 * k))
+    found, machine = table.pressures(), plant.machine
+    area = np.array([(a.area_a, a.area_b or 0.0) for a in machine.actuators])
+    # the same products of pressures and areas: rounding of 4 MN
+    np.testing.assert_allclose(
+        found.a * area[:, 0] - found.b * area[:, 1], table.sensors().force, rtol=1e-12, atol=1e-6
+    )
+    gas = table.snapshot().force[plant.spools :]
+    np.testing.assert_allclose(found.strut * [s.area for s in machine.struts], -gas, rtol=1e-12)
+    assert np.array_equal(found.spool, table.spool) and found.supply == machine.hydraulics.supply_pressure
+    droop = make_plant(machine.with_effect("supply_droop"))
+    fed = table.with_plant(droop)
+    for _ in range(20):
+        fed.advance(rest.spool + 0.2)
+    assert fed.pressures().supply < found.supply
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import typer
 
 from ..core.files import models_folder, read_toml
 
-__all__ = ["complete_motion", "completing"]
+__all__ = ["complete_motion", "completing", "effect_names"]
 
 
 def completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
@@ -22,6 +22,12 @@ def completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]
             return []
 
     return complete
+
+
+def effect_names() -> list[str]:
+    """Families of the library that a machine can have, without the laws that come with it."""
+    tables = (read_toml(path) for path in sorted((models_folder() / "library").glob("*.toml")))
+    return [name for table in tables for name, family in table.items() if "sensor" not in family["acts_on"]]
 
 
 def _motion_names() -> list[str]:

@@ -7,6 +7,7 @@ import typer
 
 from ..core.errors import ParameterError
 from .app import command, print_result, progress_bar, repeating_command, stderr
+from .completion import completing, effect_names
 from .live_view import LiveOptions, watched
 from .motion_options import MotionOptions
 from .options import (
@@ -47,21 +48,31 @@ def serve(
     host: Annotated[str, typer.Option(help="Address to listen on; default: this computer only.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="UDP port; 0: any free one.")] = 46946,
     seconds: Annotated[float | None, typer.Option(min=0.0, help="Duration [s]; default: until Ctrl-C.")] = None,
+    parked: Annotated[bool, typer.Option("--parked", help="Start with the platen parked, not raised.")] = False,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Effect of the library that clients may switch on, one at a time, such as entrained_air@H1; may be "
+            "repeated.",
+            autocompletion=completing(effect_names),
+        ),
+    ] = None,
     valves: Valves = 0,
     json: Json = False,
 ) -> None:
     """Serve the virtual table over UDP, to be driven by a controller in another process or on another computer."""
-    from ..interfaces.link import ServedPlant, find_mode, open_socket
+    from ..interfaces.link import ServedPlant, find_mode, make_faults, open_socket
     from ..interfaces.link import serve as serve_link
     from ..interfaces.link.link_summary import link_entries, print_link
-    from ..mechanics.equilibrium import find_equilibrium
+    from ..mechanics.equilibrium import find_equilibrium, parked_pose
     from ..mechanics.plant import make_plant
 
     chosen = find_mode(mode)
     table = machine.load(valves)
     with open_socket(host, port) as sock:
         plant = make_plant(table)
-        served = ServedPlant(plant, find_equilibrium(plant), chosen, exchange.coupling(table))
+        rest = find_equilibrium(plant, parked_pose(table) if parked else None)
+        served = ServedPlant(plant, rest, chosen, exchange.coupling(table), faults=make_faults(table, fault or ()))
         address, at = sock.getsockname()
         title = f"{table.name} at {address}:{at}"
         typer.echo(f"{table.name} listens at {address}:{at}, {mode}; Ctrl-C ends", err=json)

@@ -19,6 +19,7 @@ class Platen:
     bearing_plane: Vec3 = quantity_field("m", length=3)
     size: tuple[float, float] = quantity_field("m", length=2, bound="positive")
     gravity: float = quantity_field("m/s2", bound="nonnegative")
+    parked: float | None = quantity_field("m", optional=True)  # displacement along Z where it is parked
 
     @property
     def isotropic_mass(self) -> float:

@@ -1,13 +1,15 @@
-"""Static equilibrium in the control zero-position (Eq. 4-30): forces, chamber pressures, spools that feed the leaks."""
+"""Static equilibrium in the zero-position or another pose (Eq. 4-30): forces, pressures, spools that feed the leaks."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from ..core.arrays import Array
-from ..core.errors import SimulationError
+from ..core.errors import ParameterError, SimulationError
+from ..core.names import AXES
 from ..effects.actuator import start_line
 from ..effects.registry import actuator_rows, parameters_of
 from ..effects.supply import steady_supply, supply_pressures
@@ -18,13 +20,13 @@ from ..machine.machine import Machine
 from .derivatives import evaluate
 from .modes import rest_of_modes
 from .plant import Plant, State
-from .pose import PlantMotion
+from .pose import PlantMotion, PlatenMotion, plant_motion
 from .required_wrench import moving_wrenches
 from .schemes import TAU
 from .workspace import make_workspace
 
-__all__ = ["Equilibrium", "actuator_speeds", "find_equilibrium", "rest_pressures", "rest_remedy", "specimen_at_rest"]
-__all__ += ["unloaded_speeds"]
+__all__ = ["Equilibrium", "actuator_speeds", "find_equilibrium", "parked_pose", "rest_pressures", "rest_remedy"]
+__all__ += ["specimen_at_rest", "unloaded_speeds"]
 
 Pressures = tuple[float, ...]
 """Supply and return pressure [Pa], perhaps with what follows in `laws.supply.Supply`."""
@@ -36,7 +38,7 @@ _SUPPLY_TURNS = 8
 
 
 class Equilibrium(NamedTuple):
-    """Rest in the zero-position: the state, spools (n_actuators,) [1] and actuator forces (n_actuators,) [N]."""
+    """Rest in a pose: the state, spools (n_actuators,) [1] and actuator forces (n_actuators,) [N]."""
 
     state: State
     spool: Array
@@ -45,16 +47,20 @@ class Equilibrium(NamedTuple):
     wrench: pin.Force  # of the actuators on the platen, at C in {c}
 
 
-def find_equilibrium(plant: Plant) -> Equilibrium:
+def find_equilibrium(plant: Plant, pose: ArrayLike | None = None) -> Equilibrium:
     """Least-squares actuator forces that hold the platen at rest, and the pressures and spools that give them.
 
     Ten actuators hold six degrees of freedom: of all solutions of Eq. 4-30 this is the one of least norm.
-    Raises SimulationError if the actuators cannot hold the platen, or not within supply and return pressure.
+    pose: (6,) of C in {s} and Euler angles [m, rad] at which the platen rests; None: the zero-position.
+    Raises SimulationError if the actuators cannot hold the platen, or not within supply and return pressure; for a pose
+    that it cannot have, or another than zero with a specimen that is a program, which starts there.
     """
-    start = specimen_at_rest(plant)
+    at = _checked_pose(plant, pose)
+    where = "the zero-position" if not at.any() else f"pose {', '.join(f'{x:.4g}' for x in at)} m, rad"
+    start = specimen_at_rest(plant, at)
     ws = make_workspace(plant, start)
     if evaluate(plant, ws, np.zeros(plant.spools)):
-        raise SimulationError(f"{plant.machine.name}: a leg is out of its stroke in the zero-position")
+        raise SimulationError(f"{plant.machine.name}: a leg is out of its stroke in {where}")
     free = plant.axes.size
     gravity = pin.rnea(
         plant.model, plant.model.createData(), start.q, np.zeros(plant.model.nv), np.zeros(plant.model.nv)
@@ -66,23 +72,50 @@ def find_equilibrium(plant: Plant) -> Equilibrium:
     force, *_ = np.linalg.lstsq(columns, needed, rcond=None)
     miss = np.abs(columns @ force - needed).max()
     if miss > 1e-6 * max(1.0, float(np.abs(needed).max())):
-        raise SimulationError(
-            f"the actuators cannot hold the platen in the zero-position: {miss:.3g} N or N m is left over"
-        )
+        raise SimulationError(f"the actuators cannot hold the platen in {where}: {miss:.3g} N or N m is left over")
     z, spool = ws.z.copy(), np.zeros(plant.spools)
     _fill(plant, force, plant.supply[:2], z, spool)
     for _ in range(_SUPPLY_TURNS if varies(plant.supply) else 0):  # what leaks at rest is drawn from the supply, too
         steady_supply(plant.rows, spool, plant.supply, z)
         _fill(plant, force, supply_pressures(plant.supply, z), z, spool)
-    wrench = pin.SE3(np.eye(3), -plant.body[0]["rho_c"]).act(pin.Force(ws.JB[1][: plant.spools].T @ force))
-    return Equilibrium(State(start.q, start.v, z), spool, force, pin.SE3.Identity(), wrench)
+    turn = pin.rpy.rpyToMatrix(at[3:])
+    wrench = pin.SE3(turn, -turn @ plant.body[0]["rho_c"]).act(pin.Force(ws.JB[1][: plant.spools].T @ force))
+    return Equilibrium(State(start.q, start.v, z), spool, force, pin.SE3(turn, at[:3]), wrench)
 
 
-def specimen_at_rest(plant: Plant) -> State:
-    """The zero state with the specimen at rest under its weight; raises SimulationError for one that falls over."""
-    start = plant.zero_state()
+def parked_pose(machine: Machine) -> Array:
+    """Pose (6,) [m, rad] of the parked platen; raises ParameterError where none is stated or it cannot move so."""
+    if machine.platen.parked is None or 2 not in machine.axes:
+        raise ParameterError(
+            f"{machine.parameters.origin}: platen.parked is missing: where along Z the platen is parked; state "
+            "it, for a table that moves along Z, or start in the zero-position"
+        )
+    return np.array([0.0, 0.0, machine.platen.parked, 0.0, 0.0, 0.0])
+
+
+def _checked_pose(plant: Plant, pose: ArrayLike | None) -> Array:
+    at = np.zeros(6) if pose is None else np.array(pose, float)
+    if at.shape != (6,) or not np.isfinite(at).all():
+        raise SimulationError(f"a pose is six finite numbers, x y z [m], roll pitch yaw [rad]; got {pose!r}")
+    if stuck := [name for k, name in enumerate(AXES) if at[k] and k not in plant.axes]:
+        raise SimulationError(f"{plant.machine.name} cannot move in {', '.join(stuck)}; give 0 there")
+    if at.any() and plant.coupled is not None:
+        raise SimulationError("a specimen that is a program starts in the zero-position; mount another form of it")
+    return at
+
+
+def specimen_at_rest(plant: Plant, pose: Array | None = None) -> State:
+    """The zero state with the specimen at rest under its weight; raises SimulationError for one that falls over.
+
+    pose: (6,) [m, rad] of the platen; None: the zero-position.
+    """
+    start, down = plant.zero_state(), plant.model.gravity.linear
+    if pose is not None and pose.any():
+        still = plant_motion(plant, PlatenMotion(pose[None], np.zeros((1, 6)), np.zeros((1, 6))))
+        start.q[: still.q.shape[1]] = still.q[0]
+        down = pin.rpy.rpyToMatrix(pose[3:]).T @ down
     if plant.modes.size:
-        start.z[-2 * plant.modes.size :] = rest_of_modes(plant.modes, plant.model.gravity.linear)
+        start.z[-2 * plant.modes.size :] = rest_of_modes(plant.modes, down)
     return State(_rest_of_springs(plant, start.q), start.v, start.z)
 
 

@@ -4,7 +4,6 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..effects.gas import log_ratio
-from ..effects.registry import law_of
 from ..laws.nitrogen_strut import gas_pressure
 from ..machine.machine import Machine
 from .plant import Plant
@@ -18,9 +17,8 @@ def gas_ratio(plant: Plant, z: Array) -> Array:
     Changes add up, as their forces do.
     """
     ratio = np.ones((len(z), len(plant.machine.struts)))
-    for row in plant.rows:
-        if law_of(row).acts_on_gas:
-            ratio[:, row["port"] - plant.spools] += np.expm1(log_ratio(row, z))
+    for row in plant.gas_rows:
+        ratio[:, row["port"] - plant.spools] += np.expm1(log_ratio(row, z))
     return ratio
 
 

@@ -84,6 +84,16 @@ class Plant:
         return columns_of(self.rows[actuator_rows(self.rows)])
 
     @cached_property
+    def pressure_states(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Number of each actuator's hidden state that is pressure A (n_actuators,), and whether B stands behind it."""
+        return self.rows["state"][actuator_rows(self.rows)], self.actuators.area_b > 0.0
+
+    @cached_property
+    def gas_rows(self) -> NDArray[np.void]:
+        """Rows that act on the gas of struts beyond its polytropic law."""
+        return self.rows[[law_of(row).acts_on_gas for row in self.rows]]
+
+    @cached_property
     def moving(self) -> tuple["MovingRow", ...]:
         """Rows with hidden states that the motion alone drives."""
         rows = self.rows[(self.rows["state"] >= 0) & (self.rows["spool"] < 0)]

@@ -8,7 +8,9 @@ The compiled stages and their order are those of `simulate` with the Pinocchio e
 """
 
 import logging
+from copy import copy
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -18,12 +20,14 @@ from ..control.plug import Feedback
 from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..core.names import SAMPLE_RATE, SCHEMES
+from ..effects.supply import supply_pressures
 from ..mechanics.coupled import BaseMotion, checked_wrench
-from ..mechanics.derivatives import evaluate_derivatives
+from ..mechanics.derivatives import evaluate, evaluate_derivatives
 from ..mechanics.equilibrium import Equilibrium
+from ..mechanics.gas_pressure import gas_ratio, strut_pressures
 from ..mechanics.interface import base_motion
 from ..mechanics.plant import Plant, State
-from ..mechanics.schemes import V, steps_a_sample
+from ..mechanics.schemes import S, V, steps_a_sample
 from ..mechanics.specimen_mount import top_placement
 from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import make_workspace
@@ -32,13 +36,23 @@ from .simulate import diagnosis
 from .snapshot import Snapshot, take_snapshot
 from .trouble import EmptyChambers
 
-__all__ = ["RunningPlant"]
+__all__ = ["PressureReading", "RunningPlant"]
 
 log = logging.getLogger(__name__)
 
 
+class PressureReading(NamedTuple):
+    """Pressures and spools of a plant with n actuators and k struts after a sample."""
+
+    a: Array  # (n,) of chambers A [Pa]
+    b: Array  # (n,) of chambers B [Pa]; 0 where an actuator has none
+    spool: Array  # (n,) spool positions after the valve delay, mean over the sample [1]
+    strut: Array  # (k,) of the struts' gas [Pa]
+    supply: float  # [Pa]
+
+
 class RunningPlant:
-    """A plant, initially at rest in the zero-position, that takes one command per sample.
+    """A plant, initially at rest in the pose of `rest`, that takes one command per sample.
 
     Attributes: plant; sample, number of commands taken; clipped, number of spool values beyond full stroke. What makes
     the motion unphysical is logged as a warning once, and kept in `trouble`.
@@ -69,8 +83,9 @@ class RunningPlant:
         self._outside: Continued | None = None
         self._order, self._base, self._since = wrench_order, top_placement(plant.machine), 0
         self._ws = make_workspace(plant, rest.state)
-        self._window = np.zeros((steps, plant.spools))
-        self._history = np.tile(rest.spool, (int(plant.delays.max() * SAMPLE_RATE) + 4, 1))
+        self._place = _places(plant)
+        self._window = np.tile(rest.spool, (steps, 1))
+        self._history = np.tile(rest.spool, (_remembered(plant), 1))
         self._path = plant.command_path
         self._evaluate(self._ws, np.ascontiguousarray(rest.spool))
 
@@ -106,6 +121,52 @@ class RunningPlant:
         if self.scheme != SCHEMES[0]:
             self._evaluate(self._ws, self._window[0])
         return base_motion(self.plant, self._ws, self._base)
+
+    def pressures(self) -> PressureReading:
+        """Chamber pressures, spools, strut pressures and supply pressure at the next sample, in new arrays."""
+        plant, z = self.plant, self._ws.z
+        first, double = plant.pressure_states
+        b = np.where(double, z[first + double], 0.0)
+        strut = strut_pressures(plant.machine, self._ws.port[S, plant.spools : plant.legs.size])
+        if plant.gas_rows.size:
+            strut = strut * gas_ratio(plant, z[None])[0]
+        return PressureReading(z[first], b, self.spool, strut, float(supply_pressures(plant.supply, z)[0]))
+
+    def with_plant(self, plant: Plant) -> "RunningPlant":
+        """A running plant that goes on from this state with a plant of the same machine with other effects.
+
+        Motion, sample, commands so far and a wrench from outside are taken over, hidden states by their name; states
+        that this plant lacks begin at rest (`Plant.zero_state`). This running plant may go on by itself.
+        Raises SimulationError for a plant of another size, and where a specimen is a program, whose state is its own.
+        """
+        sizes = [(p.model.nq, p.model.nv, p.axes.tolist(), p.spools, p.legs.size) for p in (self.plant, plant)]
+        if sizes[0] != sizes[1]:
+            raise SimulationError(
+                f"a plant of {plant.model.nq} coordinates and {plant.spools} actuators cannot go on from one of "
+                f"{self.plant.model.nq} and {self.plant.spools}; give a plant of the same machine and specimen"
+            )
+        if self._coupled or plant.coupled:
+            raise SimulationError("effects cannot be switched while a specimen is a program; mount another form of it")
+        found, old = copy(self), self._ws
+        found.plant = plant
+        found._evaluate = partial(evaluate_derivatives, plant)
+        found._advance = WithOutside(plant, self.scheme, 1.0 / self.steps_per_second, None)
+        found._empty = EmptyChambers(plant)
+        found._empty.trouble = self._empty.trouble
+        found._outside = copy(self._outside)
+        start = plant.zero_state()
+        taken = [(i, at) for i, name in enumerate(plant.states) if (at := self._place.get(name)) is not None]
+        start.z[[i for i, _ in taken]] = old.z[[at for _, at in taken]]
+        found._place = _places(plant)
+        found._ws = make_workspace(plant, State(old.q, old.motion[V], start.z))
+        found._ws.external[:] = old.external
+        evaluate(plant, found._ws, self._window[-1])  # ports and forces
+        found._ws.motion[:] = old.motion  # and the acceleration that the last step ended with
+        rows = _remembered(plant)
+        earlier = np.repeat(self._history[:1], max(0, rows - len(self._history)), axis=0)
+        found._history = np.concatenate([earlier, self._history[-rows:]])
+        found._path, found._window = plant.command_path, self._window.copy()
+        return found
 
     @property
     def trouble(self) -> str:
@@ -165,3 +226,13 @@ class RunningPlant:
             self._since = 0
         elif self._outside is not None:
             self._outside.later(1.0 / SAMPLE_RATE)
+
+
+def _remembered(plant: Plant) -> int:
+    """Commands that the longest valve delay reaches back to."""
+    return int(plant.delays.max() * SAMPLE_RATE) + 4
+
+
+def _places(plant: Plant) -> dict[str, int]:
+    """Places of hidden states by name."""
+    return {name: i for i, name in enumerate(plant.states)}

@@ -25,6 +25,7 @@ from ...control.valves import valve_names
 from ...core.arrays import Array
 from ...core.errors import LinkError
 from ...mechanics.coupled import BaseMotion, motion_of_numbers, wrench_of
+from ...simulation.running import PressureReading
 from .clock import SECOND, Histogram, now
 from .protocol import COUNTS, MOTION, Datagram, Kind, LinkMode, PlantState, decode, encode, is_newer
 from .server import HOST, PORT
@@ -32,7 +33,7 @@ from .server import HOST, PORT
 __all__ = ["LinkClient", "Reading"]
 
 
-_LARGEST = 2048  # bytes of a datagram that are read; every frame but a welcome to a huge machine is shorter
+_LARGEST = 16384  # bytes of a datagram that are read; every frame is shorter
 
 
 class Reading(NamedTuple):
@@ -44,22 +45,35 @@ class Reading(NamedTuple):
     acknowledged: int  # sequence of the newest command that acted
     stamp: int  # the server's clock [ns]
     motion: BaseMotion  # of the interface, at C in axes of the platen
+    pressures: PressureReading | None = None  # where the client asked for them and the server knows them
 
 
 class LinkClient:
-    """A connection to a served plant, which it puts at rest in the zero-position.
+    """A connection to a served plant, which it puts at rest in the zero-position, or where the server parks it.
 
     Attributes: machine; mode; rate [Hz]; actuators and valves, their names; counts, servovalves of each actuator;
     reading, the newest; resent, commands sent again; sensors_lost, samples whose sensors never came; ignored, datagrams
-    that were no frame of this session; round_trip, from the sending of a command to the coming of sensors it acted on.
+    that were no frame of this session; round_trip, from the sending of a command to the coming of sensors it acted on;
+    faults, those that the server offered last and whether each is on, empty until it answered `ask_faults` or `switch`.
     """
 
-    def __init__(self, host: str = HOST, port: int = PORT, *, timeout: float = 0.2, tries: int = 25) -> None:
-        """Greet the server; raises LinkError if none answers `tries` datagrams within `timeout` [s] each."""
+    def __init__(
+        self,
+        host: str = HOST,
+        port: int = PORT,
+        *,
+        timeout: float = 0.2,
+        tries: int = 25,
+        pressures: bool = False,
+    ) -> None:
+        """Greet the server; raises LinkError if none answers `tries` datagrams within `timeout` [s] each.
+
+        pressures: ask for chamber, strut and supply pressures and spools with each reading.
+        """
         self._where, self._timeout, self._tries = f"{host}:{port}", timeout, tries
         self._session, self._sequence = secrets.randbits(32), 0
         self.resent = self.sensors_lost = self.ignored = 0
-        self.round_trip = Histogram()
+        self.round_trip, self.faults = Histogram(), dict[str, bool]()
         self._sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._sock.connect((host, port))
@@ -72,7 +86,7 @@ class LinkClient:
                     found[Kind.WELCOME].actuators == found[Kind.SENSORS].actuators
                 )
 
-            self._request(Datagram(Kind.HELLO, self._session), complete)
+            self._request(Datagram(Kind.HELLO, self._session, pressures=pressures), complete)
         except OSError as error:
             self._sock.close()
             raise LinkError(f"{self._where} cannot be reached: {error}") from error
@@ -135,6 +149,17 @@ class LinkClient:
                 self.newest()
                 return self.reading
         raise LinkError(self._silence())
+
+    def switch(self, name: str, on: bool) -> None:
+        """Ask for a fault to be on or off, without waiting; the answer comes into `faults` with the next readings.
+
+        A datagram may be lost: switch again until `faults` is as wanted. Raises LinkError for a name that is too long.
+        """
+        self._put(Datagram(Kind.SWITCH, self._session, fault=name, on=on))
+
+    def ask_faults(self) -> None:
+        """Ask which faults the server offers, without waiting; the answer comes as that to `switch` does."""
+        self.switch("", False)
 
     def close(self) -> Mapping[str, int]:
         """Give the plant back; returns the server's counts of this session, empty if it does not answer."""
@@ -215,6 +240,8 @@ class LinkClient:
         if frame is None or frame.session != self._session:
             self.ignored += 1
             return None
+        if frame.kind == Kind.SWITCH and frame.fault:
+            self.faults[frame.fault] = frame.on
         return frame
 
     def _take(self, frame: Datagram) -> Reading | None:
@@ -233,7 +260,12 @@ class LinkClient:
 
     def _read(self, frame: Datagram) -> Reading:
         assert frame.numbers is not None
-        n = len(self.actuators)
-        sensors = Feedback(frame.numbers[6 : 6 + n], frame.numbers[:6], frame.numbers[6 + n : 6 + 2 * n])
-        motion = motion_of_numbers(frame.numbers[-MOTION:])
-        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, motion)
+        n, k = len(self.actuators), frame.struts
+        pressures = None
+        if frame.pressures:
+            a, b, spool, strut, supply = np.split(frame.numbers[-3 * n - k - 1 :], np.cumsum([n, n, n, k]))
+            pressures = PressureReading(a, b, spool, strut, float(supply[0]))
+        at = 6 + 2 * n
+        sensors = Feedback(frame.numbers[6 : 6 + n], frame.numbers[:6], frame.numbers[6 + n : at])
+        motion = motion_of_numbers(frame.numbers[at : at + MOTION])
+        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, motion, pressures)

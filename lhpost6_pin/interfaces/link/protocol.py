@@ -1,19 +1,21 @@
 """The link's datagrams, byte by byte, for controllers in any language over UDP.
 
 All numbers are little endian, without padding; float64 is IEEE 754 binary64. One frame is one datagram. A frame is a
-header of 48 bytes and a payload whose length follows from `kind`, `actuators`, `valves` and `flags`.
+header of 48 bytes and a payload whose length follows from `kind`, `actuators`, `valves` and `flags`: n, m and k.
 
 Header
 
     offset  type     field         meaning
     0       char[4]  magic         "LHP6"
     4       uint8    version       2
-    5       uint8    kind          1 hello, 2 welcome, 3 command, 4 sensors, 5 bye, 6 status
+    5       uint8    kind          1 hello, 2 welcome, 3 command, 4 sensors, 5 bye, 6 status, 7 switch
     6       uint8    mode          0 lock-step, 1 real time, 2 free running; a client sends 0
     7       uint8    state         0 waiting for the first command, 1 running, 2 safe hold, 3 tripped; a client sends 0
-    8       uint8    actuators     n, number of actuators; 0 in hello and bye
-    9       uint8    valves        m, number of servovalves; 0 in hello and bye
-    10      uint16   flags         bit 0: crc is filled in; bit 1: a command carries a wrench; the others are 0
+    8       uint8    actuators     n, number of actuators; 0 in hello, bye and a client's switch
+    9       uint8    valves        m, number of servovalves; 0 in hello, bye and a client's switch
+    10      uint16   flags         bit 0: crc is filled in; bit 1: a command carries a wrench; bit 2: a hello asks for
+                                   pressures, sensors carry them; bits 8 to 15 in such sensors: k, number of struts;
+                                   the others are 0
     12      uint32   session       any number that the client chose for its hello; the same in every frame that follows
     16      uint32   sequence      command: 1, 2, 3 ...; sensors: sample of the plant, 0 at rest; others: 0
     20      uint32   acknowledged  sensors: sequence of the newest command that acted; command: sample it answers to
@@ -37,7 +39,15 @@ Payload
                  6 x float64      pose of the interface: position of C in {s} [m], Euler angles [rad]
                  6 x float64      its twist: velocity [m/s], angular velocity [rad/s]
                  6 x float64      its acceleration [m/s2], angular acceleration [rad/s2]
+                                  with bit 2 of flags also:
+                 n x float64      pressures of chambers A [Pa]
+                 n x float64      pressures of chambers B [Pa], 0 where an actuator has none
+                 n x float64      spool positions [1] after the valve delay, mean over the sample
+                 k x float64      pressures of the struts' gas [Pa]
+                 float64          supply pressure [Pa]
     status       12 x uint64      the server's counts, in the order of `COUNTS`
+    switch       char[39]         name of a fault, UTF-8, filled up with zeros
+                 uint8            1 on, 0 off
 
 The interface is at C, the centre of the platen's top, in axes of the platen: wrench, twist and acceleration (that of
 the point, less gravity) have their components along these. The wrench is that of what stands on the platen and is not
@@ -51,7 +61,7 @@ go on at 0 after 4294967295. Nothing but finite numbers may be sent.
 What happens
 
     client                              server
-    hello (again until answered)   ->   the plant is put at rest
+    hello (again until answered)   ->   the plant is put at rest, without faults
                                    <-   welcome, then sensors of sample 0
     command 1                      ->   the plant takes it for sample 0
                                    <-   sensors of sample 1
@@ -62,7 +72,18 @@ What happens
 In lock-step the plant moves one sample for each new command; the same command again gets the same sensors again, so
 a client without an answer sends it again. In real time and free running the plant moves by itself from the first
 command on, takes the newest command at each sample and sends sensors after each. A hello with another session number
-puts the plant at rest again, also a tripped one.
+puts the plant at rest again, also a tripped one. Rest is in the zero-position, or where the server parks the platen:
+the pose in the sensors of sample 0 says which.
+
+Pressures. A client that sets bit 2 in its hello gets them with all sensors of its session, others get sensors without.
+A server that does not know the bit sends sensors without: a client looks at the flags of each frame.
+
+Faults are effects that a server offers to add to its plant. In answer to a switch it sends one for each fault that it
+offers, with its name and whether it is on, or one with an empty name and 0 if it offers none. An empty name in the
+question only asks. A switch acts at the next sample; motion and pressures go on from where they are. One fault at a
+time is on: another that is switched on replaces it. A switch to what is already so, of an unknown name, or of a plant
+that has tripped changes nothing. A switch may be lost like any datagram: a client repeats it until the answer is as
+wanted. A server that knows no switch counts it as malformed and does not answer.
 
 Version 1 had neither wrench nor interface motion. A hello of version 1 is answered by a welcome of version 1 to a
 machine without actuators whose name is the version that is needed.
@@ -116,14 +137,17 @@ COUNTS = {
 _HEADER = struct.Struct("<4s6BH3I2Q2I")
 _WELCOME = struct.Struct("<d32s")
 _ACTUATOR = struct.Struct("<15sB")
-_CRC_AT, _HAS_CRC, _HAS_WRENCH, _WRAP = 40, 1, 2, 1 << 32
+_SWITCH = struct.Struct("<39sB")
+_CRC_AT, _HAS_CRC, _HAS_WRENCH, _HAS_PRESSURES, _STRUTS, _WRAP = 40, 1, 2, 4, 8, 1 << 32
 _WRENCH = 6
+_FAULT = 39
+"""Bytes of a fault's name at most."""
 
 
 class Kind(IntEnum):
     """Kinds of frames."""
 
-    HELLO, WELCOME, COMMAND, SENSORS, BYE, STATUS = range(1, 7)
+    HELLO, WELCOME, COMMAND, SENSORS, BYE, STATUS, SWITCH = range(1, 8)
 
 
 class LinkMode(IntEnum):
@@ -181,9 +205,13 @@ class Datagram(NamedTuple):
     acknowledged: int = 0
     stamp: int = 0
     echo: int = 0
-    numbers: Array | None = None  # command (m,) or, with a wrench, (m + 6,); or sensors (6 + 2 n + 18,)
+    numbers: Array | None = None  # command (m,) or, with a wrench, (m + 6,); or sensors (6 + 2 n + 18 [+ 3 n + k + 1],)
     welcome: Welcome | None = None
     counts: tuple[int, ...] = ()
+    pressures: bool = False  # a hello asks for them, sensors carry them
+    struts: int = 0  # k of sensors with pressures
+    fault: str = ""  # of a switch
+    on: bool = False
 
     @property
     def wrench(self) -> Array | None:
@@ -209,6 +237,8 @@ def encode(frame: Datagram) -> bytes:
     """Datagram of a frame, with its CRC-32; raises LinkError for numbers that do not fit its kind and counts."""
     if frame.kind in (Kind.COMMAND, Kind.SENSORS):
         payload = _finite(frame.numbers).tobytes()
+    elif frame.kind == Kind.SWITCH:
+        payload = _SWITCH.pack(_fault_name(frame.fault), frame.on)
     elif frame.kind == Kind.WELCOME and frame.welcome is not None:
         rate, machine, names, valves = frame.welcome
         payload = _WELCOME.pack(rate, _cut(machine, 32))
@@ -216,6 +246,8 @@ def encode(frame: Datagram) -> bytes:
     else:
         payload = struct.pack(f"<{len(frame.counts)}Q", *frame.counts)
     flags = _HAS_CRC if frame.wrench is None else _HAS_CRC | _HAS_WRENCH
+    if frame.pressures:
+        flags |= _HAS_PRESSURES | frame.struts << _STRUTS
     size = _payload_size(frame.kind, frame.actuators, frame.valves, flags)
     if len(payload) != size:
         counts = f"{frame.actuators} actuators and {frame.valves} valves"
@@ -257,19 +289,30 @@ def decode(datagram: bytes) -> Datagram:
         raise LinkError("the CRC-32 does not fit: the frame was corrupted")
     counts = actuators, valves, sequence, acknowledged, stamp, echo
     head = Kind(kind), session, LinkMode(mode), PlantState(state), *counts
+    pressures = bool(flags & _HAS_PRESSURES) and kind in (Kind.HELLO, Kind.SENSORS)
     if kind in (Kind.COMMAND, Kind.SENSORS):
-        return Datagram(*head, numbers=_finite(np.frombuffer(datagram, "<f8", offset=_HEADER.size)).astype(np.float64))
+        numbers = _finite(np.frombuffer(datagram, "<f8", offset=_HEADER.size)).astype(np.float64)
+        return Datagram(*head, numbers=numbers, pressures=pressures, struts=flags >> _STRUTS if pressures else 0)
     if kind == Kind.WELCOME:
         return Datagram(*head, welcome=_unpacked_welcome(datagram, valves))
+    if kind == Kind.SWITCH:
+        name, on = _SWITCH.unpack_from(datagram, _HEADER.size)
+        if on > 1:
+            raise LinkError(f"a fault switched to {on}; 1 is on, 0 off")
+        return Datagram(*head, fault=_text(name), on=bool(on))
+    if kind == Kind.HELLO:
+        return Datagram(*head, pressures=pressures)
     return Datagram(*head, counts=struct.unpack_from(f"<{(size - _HEADER.size) // 8}Q", datagram, _HEADER.size))
 
 
 def _payload_size(kind: Kind, actuators: int, valves: int, flags: int) -> int:
+    with_pressures = bool(flags & _HAS_PRESSURES)
     return {
         Kind.WELCOME: _WELCOME.size + actuators * _ACTUATOR.size,
         Kind.COMMAND: 8 * (valves + (_WRENCH if flags & _HAS_WRENCH else 0)),
-        Kind.SENSORS: 8 * (6 + 2 * actuators + MOTION),
+        Kind.SENSORS: 8 * (6 + 2 * actuators + MOTION + (3 * actuators + (flags >> _STRUTS) + 1) * with_pressures),
         Kind.STATUS: 8 * len(COUNTS),
+        Kind.SWITCH: _SWITCH.size,
     }.get(kind, 0)
 
 
@@ -282,6 +325,12 @@ def _unpacked_welcome(datagram: bytes, valves: int) -> Welcome:
     if sum(counts) != valves:
         raise LinkError(f"{valves} valves, of which the actuators have {sum(counts)}")
     return Welcome(rate, _text(machine), tuple(_text(name) for name, _ in rows), counts)
+
+
+def _fault_name(name: str) -> bytes:
+    if len(name.encode()) > _FAULT:
+        raise LinkError(f"the name of a fault takes at most {_FAULT} bytes; {name!r} has {len(name.encode())}")
+    return name.encode()
 
 
 def _finite(numbers: Array | None) -> Array:

@@ -32,6 +32,7 @@ from .served import MISSED_FRAMES
 __all__ = ["LinkRun", "record_of_link_run", "run_over_link"]
 
 _CHUNK = 1024  # samples between two progress reports
+_MICROMETRE = 1e-6  # [m] more than rounding, less than any pose but the zero-position
 
 
 @dataclass(frozen=True)
@@ -145,6 +146,8 @@ def _check(client: LinkClient, plant: Plant) -> None:
     machine = plant.machine
     if client.reading.sample:
         raise LinkError("the plant has moved since this client connected; a run begins at rest: connect again")
+    if np.linalg.norm(client.reading.motion.pose.translation) > _MICROMETRE:
+        raise LinkError("the served platen is parked; a run begins in the zero-position: serve without --parked")
     if (client.machine, client.actuators) != (machine.name, machine.actuator_names):
         raise LinkError(f"the server's machine is {client.machine}, the controller's {machine.name}; choose --machine")
     if not np.array_equal(client.counts, valve_counts(machine)):

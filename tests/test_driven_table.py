@@ -206,8 +206,8 @@ class Table:
     def __init__(self, machine):
         self.plant = make_plant(machine)
         rest = find_equilibrium(self.plant)
-        self.rows = Rows(len(machine.actuators), len(machine.struts), pressures=False)
-        self.engine = Engine(self.plant, rest, load_controller("lhpost6"), NUMBERS, None, self.rows)
+        self.rows = Rows(len(machine.actuators), len(machine.struts))
+        self.engine = Engine(self.plant, rest, load_controller("lhpost6"), NUMBERS, self.rows)
         self.served = ServedPlant(self.plant, rest, LinkMode.REAL_TIME)
         self.n, self.sequence = len(machine.actuators), 0
         self.recording = Recording("test")
@@ -386,7 +386,7 @@ def test_a_ring_hands_over_every_row_once_and_counts_those_that_it_loses(tmp_pat
 
 @pytest.mark.fast
 def test_samples_that_were_missed_repeat_the_row_before_and_a_new_session_is_another_record(machine):
-    layout = Rows(len(machine.actuators), len(machine.struts), pressures=False)
+    layout = Rows(len(machine.actuators), len(machine.struts))
     rows = np.zeros((8, layout.width))
     rows[:, 0] = [0, 0, 1, 2, 5, 6, 0, 1]  # read twice before the first command; 3 and 4 missed; then another session
     rows[:, layout.places["platen_displacement"].start] = np.arange(8.0)

@@ -13,7 +13,7 @@ import lhpost6_pin
 PACKAGE = Path(lhpost6_pin.__file__).parent
 
 ORDER = ["core", "laws", "motions", "effects", "machine", "mechanics", "data", "control", "simulation"]
-ORDER += ["tuning", "interfaces", "identification", "discovery", "studies", "show", "cli"]
+ORDER += ["tuning", "interfaces", "identification", "discovery", "studies", "show", "panel", "cli"]
 """The folders: one imports only from those before it. Imports for types alone count."""
 
 PINOCCHIO = {

@@ -11,6 +11,7 @@ import typer
 
 from ..core.errors import LinkError, ParameterError
 from .app import command
+from .completion import effect_names
 from .live_view import NoOpen, show_address
 from .options import SettingsName, SpecimenOptions, Valves, find_settings
 from .results_folder import folder_for
@@ -32,28 +33,38 @@ def panel(
     ] = None,
     host: Annotated[str, typer.Option(help="Address to listen on; default: this computer only.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the page; 0: any free one.")] = 0,
+    trainer: Annotated[
+        bool, typer.Option("--trainer", help="Offer faults, to be switched on while the table is driven.")
+    ] = False,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(help="A fault to offer, as entrained_air@H1; repeat for more.", autocompletion=effect_names),
+    ] = None,
     no_open: NoOpen = False,
 ) -> None:
     """Drive the table by hand from a page in a browser: start-up, setpoints, waves, motions, interlocks, recordings.
 
     With another --host the page is open to others, who need the token in the address that is printed.
     """
+    from ..interfaces.link import make_faults
     from ..panel.session import Session
     from ..panel.web import PanelServer
-    from ..panel.worker import Setup
+    from ..panel.worker import Setup, panel_numbers
 
     table = machine.load(valves)
     settings = find_settings(controller, table)
     there = _address(server)
+    offered = fault or (str(panel_numbers().words["trainer.faults"]).split(", ") if trainer else [])
+    make_faults(table, offered)  # a wrong name is refused here
     folder = folder_for(out, "panel")
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(2) as work:
         facts = {"controller": settings.name}
-        setup = Setup(table, settings, None, Path(scratch) / "ring")
-        session = Session(setup, folder, there, work, facts)
+        setup = Setup(table, settings, Path(scratch) / "ring")
+        session = Session(setup, folder, there, work, facts, offered)
         try:
             try:
-                page = PanelServer(session, host, port, False)
+                page = PanelServer(session, host, port, trainer=trainer or bool(fault))
             except OSError as error:
                 raise LinkError(f"cannot listen on {host}:{port}: {error}; choose another --host or --port") from error
             show_address(page.url, f"the panel of {table.name}; Ctrl-C ends", not no_open)

@@ -27,6 +27,8 @@ from .rows import Rows
 
 __all__ = ["BLOCK", "Engine", "Status"]
 
+_PRESSURES = ("chamber_pressure_a", "chamber_pressure_b", "spool_position", "strut_pressure", "supply_pressure")
+
 BLOCK = 32
 """Samples whose reference is computed together: an order acts within 16 ms, a trip at once."""
 
@@ -58,14 +60,13 @@ class Engine:
         rest: Equilibrium,
         settings: ControllerSettings,
         numbers: Parameters,
-        parked: float | None,
         rows: Rows,
     ) -> None:
-        """Prepare; `parked` is the height [m] of a parked platen, None for a machine that is not parked."""
+        """Prepare the controller; it begins at low pressure."""
         self._controller: Controller = make_controller(plant, rest, settings)
         self._tables = self._controller.tables
         self._interlocks = Interlocks(self._controller, rest, numbers)
-        self._numbers, self._rows, self._parked = numbers, rows, parked
+        self._numbers, self._rows, self._parked = numbers, rows, plant.machine.platen.parked
         limits = plant.machine.limits
         free = np.isin(np.arange(6), plant.axes)
         self._speed = np.where(free, limits.velocity, np.inf)
@@ -79,7 +80,7 @@ class Engine:
         self._block, self._first = Moved(*np.zeros((3, 0, 6))), 0
         self._last = 0
         self._now = Measured(np.zeros(6), np.zeros(6), np.zeros(6), rest.force)
-        self.row = np.zeros(rows.width)
+        self.row = np.full(rows.width, np.nan)
 
     # ------------------------------------------------------------------------------------- orders
     def order(self, order: Mapping[str, Any], program: Program | None = None) -> None:
@@ -256,6 +257,9 @@ class Engine:
         row[places["actuator_displacement"]] = reading.sensors.displacement
         row[places["actuator_force"]] = now.force
         row[places["spool_command"]] = self._command
+        if reading.pressures is not None:
+            for name, values in zip(_PRESSURES, reading.pressures, strict=True):
+                row[places[name]] = values
 
     def _reference(self, sample: int) -> Moved:
         """Reference (6,) each of a sample."""

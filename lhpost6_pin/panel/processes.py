@@ -1,6 +1,6 @@
 """The other processes of a panel as its page's process holds them: started, spoken to without waiting, ended."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from multiprocessing import get_context
 from typing import Any
@@ -45,9 +45,9 @@ class _Process:
 class PlantProcess(_Process):
     """A plant of the panel's own behind the link; attribute `address`, host and port."""
 
-    def __init__(self, machine: Machine) -> None:
-        """Start it, and wait until it listens."""
-        super().__init__(serve_plant, machine)
+    def __init__(self, machine: Machine, faults: Sequence[str]) -> None:
+        """Start it, and wait until it listens; `faults` it offers to a trainer."""
+        super().__init__(serve_plant, machine, faults)
         self.address: tuple[str, int] = self._pipe.recv()
 
 

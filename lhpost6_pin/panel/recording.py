@@ -74,7 +74,7 @@ def record_of_rows(rows: Array, layout: Rows, machine: Machine, attrs: Mapping[s
         PlatenMotion(*(layout.of(rows, f"reference_{q}") for q in ("displacement", "velocity", "acceleration")))
     )
     labels = machine.labels
-    if "chamber_pressure_a" in layout.widths:
+    if np.isfinite(layout.of(rows, "supply_pressure")).all():
         double = [name in machine.double_acting for name in machine.actuator_names]
         channels |= {name: layout.of(rows, name) for name in ("chamber_pressure_a", "spool_position")}
         channels["supply_pressure"] = layout.of(rows, "supply_pressure")[:, 0]

@@ -13,19 +13,18 @@ STATE = ("sample", "plant_state", "state", "program_time")
 class Rows:
     """Places of named columns in a row, for a plant of so many actuators and struts.
 
-    `pressures`: the server sends chamber pressures, spools, strut pressures and the supply pressure, too.
+    Pressures and spools are not-a-number where the server does not send them.
     """
 
-    def __init__(self, actuators: int, struts: int, pressures: bool) -> None:
+    def __init__(self, actuators: int, struts: int) -> None:
         """Lay out the columns."""
         widths = dict.fromkeys(STATE, 1)
         for who in ("platen", "reference"):
             widths |= {f"{who}_{quantity}": 6 for quantity in ("displacement", "velocity", "acceleration")}
         widths |= {"shares": len(INTERLOCKS)}
         widths |= dict.fromkeys(("actuator_displacement", "actuator_force", "spool_command"), actuators)
-        if pressures:
-            widths |= dict.fromkeys(("chamber_pressure_a", "chamber_pressure_b", "spool_position"), actuators)
-            widths |= {"strut_pressure": struts, "supply_pressure": 1}
+        widths |= dict.fromkeys(("chamber_pressure_a", "chamber_pressure_b", "spool_position"), actuators)
+        widths |= {"strut_pressure": struts, "supply_pressure": 1}
         self.widths = widths
 
     @cached_property

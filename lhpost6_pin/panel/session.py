@@ -1,19 +1,19 @@
 """What a panel knows and does between its browsers and the controller: seats, orders, recordings, the journal."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..core.errors import ControllerError, LhpostError
 from ..core.names import AXES, SAMPLE_RATE
 from ..data.motion_files import motion_of
 from ..data.records import save_record
+from ..interfaces.link import PlantState
 from ..mechanics.plant import make_plant
 from ..motions import make_target
 from .demand import check_program
@@ -54,11 +54,12 @@ class Session:
         server: tuple[str, int] | None,
         work: Executor,
         facts: Mapping[str, Any],
+        faults: Sequence[str] = (),
     ) -> None:
         """Start the processes; `server` is one elsewhere, `facts` go into the attributes of records."""
         self._setup, self._folder, self._server, self._work, self._facts = setup, folder, server, work, dict(facts)
         self.machine, self._plant, self._numbers = setup.machine, make_plant(setup.machine), panel_numbers()
-        self._own = None if server else work.submit(PlantProcess, setup.machine)
+        self._own = None if server else work.submit(PlantProcess, setup.machine, faults)
         self._control = ControlProcess(setup)
         self.layout = rows_of(setup.machine)
         self._ring = RingReader(setup.ring, self.layout.width)
@@ -69,8 +70,11 @@ class Session:
         self.recording: Recording | None = None
         self.recordings: list[str] = []
         self.link, self.answered, self.missed, self._newest = "off", 0, 0, -1
+        self.holds, self._held = 0, False
+        self.server = "of its own" if server is None else f"{server[0]}:{server[1]}"
         self.counts: dict[str, Any] = {"late": 0.0, "samples": 0, "holds": 0}
         self._program: Program | None = None
+        self._offered, self.faults = tuple(faults), dict[str, bool]()
         self._motions: set[str] = set()
 
     def close(self) -> None:
@@ -168,6 +172,11 @@ class Session:
             limit = f" limit {100.0 * float(message['limit']):g} %" if "limit" in message else ""
             on = f" {'on' if message['on'] else 'off'}" if "on" in message else ""
             return {**message, "what": f"sets the interlock {message['name']}:{limit}{on}"}
+        if do == "fault":
+            where = str(message.get("where", "all"))
+            name = str(message["name"]) if where == "all" else f"{message['name']}@{where}"
+            on = bool(message["on"])
+            return {"do": do, "name": name, "on": on, "what": f"switches the fault {name} {'on' if on else 'off'}"}
         words = {"raise": "raises the platen", "park": "parks the platen", "run": "runs the program", "reset": "resets"}
         words |= {"hold": "holds the program", "stop": "stops the program", "trip": "trips the table"}
         if do not in words:
@@ -234,7 +243,7 @@ class Session:
         if address is None:
             assert self._own is not None
             if not self._own.result().alive:
-                self._own = self._work.submit(PlantProcess, self.machine)
+                self._own = self._work.submit(PlantProcess, self.machine, self._offered)
             address = self._own.result().address
         return {"do": "pressure", "to": "low", "host": address[0], "port": address[1], "what": "sets the pressure low"}
 
@@ -284,17 +293,21 @@ class Session:
             self._heed(kind, content)
         rows = self._ring.read()
         if len(rows):
-            self._count(rows[:, 0].astype(int))
+            self._count(rows)
         if self.recording is not None:
             self.recording.add(rows)
         return rows
 
-    def _count(self, samples: NDArray[np.int64]) -> None:
-        """Count samples that the controller answered, and those that it missed."""
+    def _count(self, rows: Array) -> None:
+        """Count samples that the controller answered, those that it missed, and safe holds."""
+        samples = rows[:, 0].astype(int)
         steps = np.diff(samples, prepend=self._newest if samples[0] > self._newest >= 0 else samples[0])
         self.answered += int(np.count_nonzero(steps > 0))
         self.missed += int((steps[steps > 1] - 1).sum())
         self._newest = int(samples[-1])
+        state = rows[:, 1] == PlantState.HOLD
+        self.holds += int(np.count_nonzero(state[1:] & ~state[:-1])) + int(state[0] and not self._held)
+        self._held = bool(state[-1])
 
     def _heed(self, kind: str, content: Any) -> None:
         if kind == "status":
@@ -302,13 +315,16 @@ class Session:
                 self.journal.note("interlock", f"trip: {content.trip}")
             self.status, self.link = content, "on"
         elif kind == "done":
-            self.journal.note(content["who"], content["what"])
+            if content["what"]:
+                self.journal.note(content["who"], content["what"])
             if content["do"] == "load" and "scale" in content:
                 self._control.order({"do": "scale", "value": content["scale"], "who": content["who"], "what": ""})
         elif kind == "refusal":
             number, why = content
             for seat in [self.seats[number]] if number in self.seats else self.seats.values():
                 seat.refuse(why)
+        elif kind == "faults":
+            self.faults = content
         elif kind == "lost":
             self.journal.note("link", content)
             self.link = "lost"

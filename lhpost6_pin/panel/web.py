@@ -144,6 +144,7 @@ class PanelServer:
             "kind": "hello",
             "machine": machine.name,
             "axes": AXES,
+            "units": {axis: "mm" if k < 3 else "deg" for k, axis in enumerate(AXES)},
             "axes_free": free,
             "actuators": machine.actuator_names,
             "waves": WAVES,
@@ -160,7 +161,8 @@ class PanelServer:
         rows = session.look()
         if len(rows):
             self._last = rows[-1]
-            self._draw()
+            if self._shared.watched:
+                self._draw()
         state = self._state(rows[::_EVERY])
         for number, browser in list(self._browsers.items()):
             seat, entries = session.seats[number], session.journal.entries
@@ -172,7 +174,8 @@ class PanelServer:
     def _draw(self) -> None:
         of = self._session.layout.of
         row = self._last[None]
-        struts = np.zeros(len(self._session.machine.struts))
+        machine, pressure = self._session.machine, np.nan_to_num(of(row, "strut_pressure")[0])
+        struts = -pressure * np.array([strut.area for strut in machine.struts])
         force = np.concatenate([of(row, "actuator_force")[0], struts])
         self._scene.draw(Snapshot(float(row[0, 0]) / SAMPLE_RATE, of(row, "platen_displacement")[0], force))
 
@@ -181,6 +184,8 @@ class PanelServer:
         operator = session.operator
         found: dict[str, Any] = {
             "kind": "state",
+            "machine": session.machine.name,
+            "server": session.server,
             "time": self._last[0] / SAMPLE_RATE,
             "operator": operator.name if operator else None,
             "watchers": len(session.seats) - (operator is not None),
@@ -189,6 +194,7 @@ class PanelServer:
                 "word": session.link,
                 "late": session.missed / max(session.answered + session.missed, 1),
                 "samples": session.answered,
+                "holds": session.holds,
             },
             "pressure": status.pressure if status else "off",
             "platen": status.platen if status else "parked",
@@ -200,7 +206,7 @@ class PanelServer:
             if session.recording
             else None,
             "recordings": session.recordings,
-            "faults": [],
+            "faults": [_fault(name, on) for name, on in session.faults.items()] if self._trainer else [],
         }
         time = float(self._last[3])
         found["program"] = {
@@ -209,27 +215,37 @@ class PanelServer:
             "time": time,
             "duration": status.duration if status else None,
         }
-        if status is not None:
-            shares = session.layout.of(self._last[None], "shares")[0]
-            found["interlocks"] = [
-                {"name": name, "share": share, "limit": limit, "on": on, "where": where}
-                for name, share, limit, on, where in zip(
-                    INTERLOCKS, shares, status.limits, status.on, status.where, strict=True
-                )
-            ]
-            found["bars"] = self._bars()
-            found["scope"] = self._scope(rows)
+        count = len(INTERLOCKS)
+        shares = session.layout.of(self._last[None], "shares")[0] if status else np.zeros(count)
+        stated = (
+            (status.limits, status.on, status.where) if status else ((1.0,) * count, (True,) * count, ("",) * count)
+        )
+        names = ("name", "share", "limit", "on", "where")
+        found["interlocks"] = [
+            dict(zip(names, row, strict=True)) for row in zip(INTERLOCKS, shares, *stated, strict=True)
+        ]
+        found["bars"] = self._bars()
+        found["scope"] = self._scope(rows)
         plain: dict[str, Any] = jsonable(found)
         return plain
 
     def _bars(self) -> dict[str, dict[str, float]]:
         of, row, names = self._session.layout.of, self._last[None], self._session.machine.actuator_names
         force = of(row, "actuator_force")[0]
+        if self._session.status is None:
+            return {"force": {}, "pressure": {}, "spool": {}, "limits": {}}
         with np.errstate(divide="ignore", invalid="ignore"):
             share = force / np.where(force < 0.0, self._capacity["actuator_pull"], self._capacity["actuator_force"])
             limits = of(row, "platen_displacement")[0] / self._capacity["displacement"]
+        supply = float(of(row, "supply_pressure")[0, 0])
+        pressures: dict[str, float] = {}
+        for letter in "ab":
+            column = of(row, f"chamber_pressure_{letter}")[0] / supply
+            shown = _named([f"{name} {letter.upper()}" for name in names], column)
+            pressures |= {k: v for k, v in shown.items() if letter == "a" or v > 0.0}
         return {
             "force": _named(names, share),
+            "pressure": pressures,
             "spool": _named(names, of(row, "spool_command")[0]),
             "limits": _named(AXES, limits),
         }
@@ -240,6 +256,11 @@ class PanelServer:
         names |= {"acceleration_reference": "reference_acceleration", "acceleration": "platen_acceleration"}
         found: dict[str, Any] = {"t": np.round(rows[:, 0] / SAMPLE_RATE, 4).tolist()}
         return found | {name: np.round(of(rows, column), 6).tolist() for name, column in names.items()}
+
+
+def _fault(name: str, on: bool) -> dict[str, Any]:
+    family, _, where = name.partition("@")
+    return {"name": family, "where": where or "all", "on": on}
 
 
 def _named(names: Any, shares: Array) -> dict[str, float]:

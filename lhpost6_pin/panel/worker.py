@@ -4,7 +4,7 @@ import logging
 import os
 import signal
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -15,11 +15,11 @@ import numpy as np
 from ..control.settings import ControllerSettings
 from ..core.errors import LhpostError, LinkError, SimulationError
 from ..core.files import models_folder
-from ..interfaces.link import LinkClient, LinkMode, PlantState, Reading, ServedPlant, open_socket, serve
+from ..interfaces.link import LinkClient, LinkMode, PlantState, Reading, ServedPlant, make_faults, open_socket, serve
 from ..interfaces.link.clock import undisturbed
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters, load_parameters
-from ..mechanics.equilibrium import find_equilibrium
+from ..mechanics.equilibrium import find_equilibrium, parked_pose
 from ..mechanics.plant import make_plant
 from .engine import Engine, Status
 from .programs import Program, Recorded
@@ -36,6 +36,7 @@ _IDLE, _SILENCE = (
 )  # [s] between looks at orders; without sensors until the link is lost
 _OFTEN = 64  # samples between looks at orders, and at what is to be shown
 _KEEP = 2048  # samples between signs of life to a server that is not commanded
+_NICE = -10  # of the processes in real time
 _MOST_UNSEEN = 16  # messages to the page that it has not taken, from which on the next ones wait
 
 
@@ -44,7 +45,6 @@ class Setup(NamedTuple):
 
     machine: Machine
     settings: ControllerSettings
-    parked: float | None  # height of a parked platen [m]
     ring: Path
 
 
@@ -80,12 +80,12 @@ def panel_numbers() -> Parameters:
 
 def rows_of(machine: Machine) -> Rows:
     """Layout of a machine's rows."""
-    return Rows(len(machine.actuators), len(machine.struts), pressures=False)
+    return Rows(len(machine.actuators), len(machine.struts))
 
 
 def control(pipe: Connection, setup: Setup) -> None:
     """Run the controller until the other end of the pipe is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the page's process ends this one
+    _first()
     link = _Link(pipe)
     controller = _Controller(setup, link)
     with suppress(EOFError, OSError):
@@ -106,6 +106,7 @@ class _Controller:
         self._client: LinkClient | None = None
         self._reading: Reading | None = None
         self._shown: Status | None = None
+        self._offered: dict[str, bool] = {}
         self._counted = self._answered = self._kept = 0
         link.say("ready", None)
 
@@ -159,6 +160,9 @@ class _Controller:
             if self._shown is None or status._replace(program_time=0.0) != self._shown:
                 self._shown = status._replace(program_time=0.0)
                 self._link.say("status", status)
+            if self._client.faults != self._offered:
+                self._offered = dict(self._client.faults)
+                self._link.say("faults", self._offered)
         self._link.look()
         self._obey()
 
@@ -182,6 +186,13 @@ class _Controller:
             if self._client is None:
                 self._begin(str(order["host"]), int(order["port"]))
                 return
+        if order["do"] == "fault":
+            if self._client is None:
+                raise SimulationError("the pressure is off; set it low first")
+            if str(order["name"]) not in self._client.faults:
+                raise SimulationError(f"the server offers no fault {order['name']}")
+            self._client.switch(str(order["name"]), bool(order["on"]))
+            return
         if self._engine is None:
             raise SimulationError("the pressure is off; set it low, then high")
         self._engine.order(order, _program_of(order))
@@ -189,7 +200,7 @@ class _Controller:
             self._answer(self._client, self._engine)  # a plant that waits for its first command sends nothing
 
     def _begin(self, host: str, port: int) -> None:
-        self._client = LinkClient(host, port, tries=10)
+        self._client = LinkClient(host, port, tries=10, pressures=True)
         wanted = self._setup.machine
         found = self._client.machine, self._client.actuators
         if found != (wanted.name, wanted.actuator_names):
@@ -202,9 +213,8 @@ class _Controller:
             raise LinkError("the server runs in lock-step; start it with --mode real-time")
         self._reading, self._kept, self._answered = self._client.reading, 0, 0
         self._shown = None
-        self._engine = Engine(
-            self._plant, self._rest, self._setup.settings, self._numbers, self._setup.parked, self._rows
-        )
+        self._engine = Engine(self._plant, self._rest, self._setup.settings, self._numbers, self._rows)
+        self._client.ask_faults()
         self._look()
 
     def _end(self) -> None:
@@ -212,6 +222,13 @@ class _Controller:
         if self._client is not None:
             self._link.say("ended", (self._client.close(), self._answered, self._client.sensors_lost))
         self._client = self._engine = self._shown = None
+
+
+def _first() -> None:
+    """Come before other processes where the system allows it; Ctrl-C is for the page's process, which ends this one."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with suppress(OSError):
+        os.nice(_NICE)
 
 
 def _program_of(order: Mapping[str, Any]) -> Program | None:
@@ -225,11 +242,15 @@ def _program_of(order: Mapping[str, Any]) -> Program | None:
     return Recorded(str(order["name"]), *rows)
 
 
-def serve_plant(pipe: Connection, machine: Machine) -> None:
-    """Serve a plant in real time until the other end of the pipe is closed; sends its address first."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def serve_plant(pipe: Connection, machine: Machine, faults: Sequence[str]) -> None:
+    """Serve a plant in real time until the other end of the pipe is closed; sends its address first.
+
+    The platen is parked where the machine says how low.
+    """
+    _first()
     plant = make_plant(machine)
-    served = ServedPlant(plant, find_equilibrium(plant), LinkMode.REAL_TIME)
+    rest = find_equilibrium(plant, None if machine.platen.parked is None else parked_pose(machine))
+    served = ServedPlant(plant, rest, LinkMode.REAL_TIME, faults=make_faults(machine, faults))
     stop = threading.Event()
 
     def wait() -> None:

@@ -23,7 +23,7 @@ from .frames import AS_IT_IS, Look
 from .scene import draw_arrows, draw_machine, draw_names, table_of
 from .show import machine_legend
 from .viewer_page import Caption, render_page
-from .window import LoopbackWindow, SharedWindow
+from .window import LoopbackWindow, Placed, SharedWindow
 
 __all__ = ["LiveScene", "LiveView", "view_apart"]
 
@@ -66,7 +66,7 @@ class LiveScene:
         q = joint_positions(self._machine, self._bodies.model, self._look.amplify * snapshot.displacement)
         poses = body_poses(self._bodies.model, q)[0]
         for joint, name in self._moving.items():
-            self._table[name].set_transform(pin.XYZQUATToSE3(poses[joint]).homogeneous)
+            self._window.send(Placed(self._table[name].path.lower(), pin.XYZQUATToSE3(poses[joint]).homogeneous))
         force = snapshot.force - self._still
         sizes, colours = arrow_sizes(self._machine, force, self._largest), arrow_colours(force, self._largest)
         for name, size, colour in zip(self._names, sizes, colours, strict=True):

@@ -8,7 +8,7 @@ from ..laws.nitrogen_strut import gas_pressure
 from ..machine.machine import Machine
 from .plant import Plant
 
-__all__ = ["gas_ratio", "strut_pressures"]
+__all__ = ["gas_numbers", "gas_pressures", "gas_ratio", "strut_pressures"]
 
 
 def gas_ratio(plant: Plant, z: Array) -> Array:
@@ -24,6 +24,15 @@ def gas_ratio(plant: Plant, z: Array) -> Array:
 
 def strut_pressures(machine: Machine, elongation: Array) -> Array:
     """Nitrogen pressures (n, n_struts) [Pa] at elongations (n, n_struts) [m]: P_0 (1 + dL / L_c0)^-n (Eq. 4-7)."""
-    numbers = np.array([(s.pressure, s.gas_length, s.polytropic_index) for s in machine.struts]).reshape(-1, 3)
+    return gas_pressures(gas_numbers(machine), elongation)
+
+
+def gas_numbers(machine: Machine) -> Array:
+    """Numbers of the nominal law (3, n_struts): P_0 [Pa], L_c0 [m], n [1]."""
+    return np.array([(s.pressure, s.gas_length, s.polytropic_index) for s in machine.struts]).reshape(-1, 3).T
+
+
+def gas_pressures(numbers: Array, elongation: Array) -> Array:
+    """Nitrogen pressures as `strut_pressures`, of the numbers of a machine."""
     law = gas_pressure.py_func  # type: ignore[attr-defined]  # the scalar law as plain Python takes whole columns
-    return np.asarray(law(elongation, *numbers.T), np.float64)
+    return np.asarray(law(elongation, *numbers), np.float64)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..control.controller import Controller
 from ..core.arrays import Array
+from ..core.compiled import compiled
 from ..core.names import AXES, SAMPLE_RATE
 from ..interfaces.link import Reading
 from ..machine.parameters import Parameters
@@ -41,6 +42,36 @@ def measured_motion(reading: Reading) -> Measured:
     return Measured(displacement, velocity, reading.sensors.acceleration, reading.sensors.force)
 
 
+@compiled
+def _look(now, command, tables, full, longest, run, shares, worst):
+    """Fill the shares (6,) and the places (6,) of the largest of a sample: motion (18,) and force (n,) in `now`."""
+    per, rest, rise, fall, moment, turn = tables
+    for i in range(3):
+        shares[i] = -1.0
+        for k in range(6):
+            share = abs(now[6 * i + k]) * per[i, k]
+            if share > shares[i]:
+                shares[i], worst[i] = share, k
+    n = rest.size
+    shares[3] = shares[4] = shares[5] = -1.0
+    roll = pitch = 0.0
+    for j in range(n):
+        beyond = now[18 + j] - rest[j]
+        share = beyond * rise[j] if beyond > 0.0 else -beyond * fall[j]
+        if share > shares[3]:
+            shares[3], worst[3] = share, j
+        roll += moment[0, j] * beyond
+        pitch += moment[1, j] * beyond
+        run[j] = run[j] + 1.0 if abs(command[j]) >= full else 0.0
+        if run[j] / longest > shares[5]:
+            shares[5], worst[5] = run[j] / longest, j
+    for k in range(2):
+        total = roll if k == 0 else pitch
+        share = total / turn[0, k] if total > 0.0 else -total / turn[1, k]
+        if share > shares[4]:
+            shares[4], worst[4] = share, k
+
+
 class Interlocks:
     """Limits of a table that is driven.
 
@@ -64,6 +95,7 @@ class Interlocks:
         self._moment = wrench_at_bearings(plant, at_b)[:, 3:5].T  # (2, n) moments at N per force
         self._turn = np.array([along.rise[3:5], along.fall[3:5]])
         self._turn[self._turn == 0.0] = np.inf
+        self._tables = self._per, self._rest, self._rise, self._fall, self._moment, self._turn
         self._names = plant.machine.actuator_names
         self._spool = controller.settings.spool_limit
         self._longest = numbers.number("interlock.saturation") * SAMPLE_RATE
@@ -78,15 +110,8 @@ class Interlocks:
 
     def look(self, now: Measured, command: Array) -> int | None:
         """Number of an interlock whose limit is passed, or None; command (n,) is the last one."""
-        motion = np.abs(np.array(now[:3])) * self._per
-        beyond = now.force - self._rest
-        force = np.where(beyond > 0.0, beyond * self._rise, -beyond * self._fall)
-        moment = self._moment @ beyond
-        turn = np.where(moment > 0.0, moment / self._turn[0], -moment / self._turn[1])
-        self._run = np.where(np.abs(command) >= self._spool - 1e-9, self._run + 1.0, 0.0)
-        for i, row in enumerate((*motion, force, turn, self._run / self._longest)):
-            at = int(row.argmax())
-            self.shares[i], self._worst[i] = row[at], at
+        full, state = self._spool - 1e-9, (self._run, self.shares, self._worst)
+        _look(np.concatenate(now), command, self._tables, full, self._longest, *state)
         over = (self.shares > self.limit) & self.on
         return int(over.argmax()) if over.any() else None
 

@@ -175,8 +175,8 @@ class Session:
         if do == "fault":
             where = str(message.get("where", "all"))
             name = str(message["name"]) if where == "all" else f"{message['name']}@{where}"
-            on = bool(message["on"])
-            return {"do": do, "name": name, "on": on, "what": f"switches the fault {name} {'on' if on else 'off'}"}
+            what = f"switches the fault {name} {'on' if message['on'] else 'off'}"
+            return {"do": do, "name": name, "on": bool(message["on"]), "what": what}
         words = {"raise": "raises the platen", "park": "parks the platen", "run": "runs the program", "reset": "resets"}
         words |= {"hold": "holds the program", "stop": "stops the program", "trip": "trips the table"}
         if do not in words:

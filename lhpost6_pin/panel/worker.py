@@ -2,6 +2,7 @@
 
 import logging
 import os
+import select
 import signal
 import threading
 from collections.abc import Mapping, Sequence
@@ -34,9 +35,8 @@ _IDLE, _SILENCE = (
     0.1,
     1.0,
 )  # [s] between looks at orders; without sensors until the link is lost
-_OFTEN = 64  # samples between looks at orders, and at what is to be shown
+_OFTEN, _SELDOM = 64, 256  # samples between looks at orders, and at what is to be shown
 _KEEP = 2048  # samples between signs of life to a server that is not commanded
-_NICE = -10  # of the processes in real time
 _MOST_UNSEEN = 16  # messages to the page that it has not taken, from which on the next ones wait
 
 
@@ -61,7 +61,7 @@ class _Link:
 
     def look(self, seconds: float = 0.0) -> None:
         """Take orders, and send what there is room for; raises EOFError once the page's process has ended."""
-        while self._pipe.poll(seconds):
+        while select.select([self._pipe], [], [], seconds)[0]:  # its own poll takes ten times as long
             taken = self._pipe.recv()
             seconds = 0.0
             if taken is None:
@@ -140,7 +140,7 @@ class _Controller:
                     return
             else:
                 client.keep()
-            self._look()
+            self._look(turns % _SELDOM == 0 or reading is None)
 
     def _answer(self, client: LinkClient, engine: Engine) -> None:
         assert self._reading is not None
@@ -153,9 +153,9 @@ class _Controller:
             self._kept = self._reading.sample
         self._ring.write(engine.row)
 
-    def _look(self) -> None:
-        """Take orders and show the state."""
-        if self._engine is not None and self._client is not None:
+    def _look(self, show: bool = True) -> None:
+        """Take orders and, if it is to be, show the state."""
+        if show and self._engine is not None and self._client is not None:
             status = self._engine.status
             if self._shown is None or status._replace(program_time=0.0) != self._shown:
                 self._shown = status._replace(program_time=0.0)
@@ -227,8 +227,8 @@ class _Controller:
 def _first() -> None:
     """Come before other processes where the system allows it; Ctrl-C is for the page's process, which ends this one."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with suppress(OSError):
-        os.nice(_NICE)
+    with suppress(AttributeError, OSError):  # another system, or no right to it
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(os.sched_get_priority_min(os.SCHED_RR)))
 
 
 def _program_of(order: Mapping[str, Any]) -> Program | None:

@@ -24,7 +24,7 @@ from ..effects.supply import supply_pressures
 from ..mechanics.coupled import BaseMotion, checked_wrench
 from ..mechanics.derivatives import evaluate, evaluate_derivatives
 from ..mechanics.equilibrium import Equilibrium
-from ..mechanics.gas_pressure import gas_ratio, strut_pressures
+from ..mechanics.gas_pressure import gas_numbers, gas_pressures, gas_ratio
 from ..mechanics.interface import base_motion
 from ..mechanics.plant import Plant, State
 from ..mechanics.schemes import S, V, steps_a_sample
@@ -86,7 +86,7 @@ class RunningPlant:
         self._place = _places(plant)
         self._window = np.tile(rest.spool, (steps, 1))
         self._history = np.tile(rest.spool, (_remembered(plant), 1))
-        self._path = plant.command_path
+        self._path, self._gas = plant.command_path, gas_numbers(plant.machine)
         self._evaluate(self._ws, np.ascontiguousarray(rest.spool))
 
     @property
@@ -127,7 +127,7 @@ class RunningPlant:
         plant, z = self.plant, self._ws.z
         first, double = plant.pressure_states
         b = np.where(double, z[first + double], 0.0)
-        strut = strut_pressures(plant.machine, self._ws.port[S, plant.spools : plant.legs.size])
+        strut = gas_pressures(self._gas, self._ws.port[S, plant.spools : plant.legs.size])
         if plant.gas_rows.size:
             strut = strut * gas_ratio(plant, z[None])[0]
         return PressureReading(z[first], b, self.spool, strut, float(supply_pressures(plant.supply, z)[0]))

@@ -40,6 +40,9 @@ def panel(
         list[str] | None,
         typer.Option(help="A fault to offer, as entrained_air@H1; repeat for more.", autocompletion=effect_names),
     ] = None,
+    pace: Annotated[
+        float, typer.Option(help="Speed of the table's clock; below 1 for a computer that is too slow for real time.")
+    ] = 1.0,
     no_open: NoOpen = False,
 ) -> None:
     """Drive the table by hand from a page in a browser: start-up, setpoints, waves, motions, interlocks, recordings.
@@ -54,6 +57,8 @@ def panel(
     table = machine.load(valves)
     settings = find_settings(controller, table)
     there = _address(server)
+    if not 0.0 < pace <= 1.0:
+        raise ParameterError(f"--pace {pace:g}: give a number above 0 and up to 1, which is real time")
     offered = fault or (str(panel_numbers().words["trainer.faults"]).split(", ") if trainer else [])
     make_faults(table, offered)  # a wrong name is refused here
     folder = folder_for(out, "panel")
@@ -61,7 +66,7 @@ def panel(
     with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(2) as work:
         facts = {"controller": settings.name}
         setup = Setup(table, settings, Path(scratch) / "ring")
-        session = Session(setup, folder, there, work, facts, offered)
+        session = Session(setup, folder, there, work, facts, offered, pace)
         try:
             try:
                 page = PanelServer(session, host, port, trainer=trainer or bool(fault))

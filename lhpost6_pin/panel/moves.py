@@ -60,4 +60,4 @@ def move_to(target: Array, time: float, seconds: float, start: Moved) -> Move:
 def at_rest(value: Array, time: float = 0.0) -> Move:
     """Values (k,) that rest."""
     value = np.asarray(value, dtype=float)
-    return Move(time, 1.0, np.vstack([value, np.zeros((5, len(value)))]), value)
+    return Move(time - 1.0, 1.0, np.vstack([value, np.zeros((5, len(value)))]), value)

@@ -45,9 +45,9 @@ class _Process:
 class PlantProcess(_Process):
     """A plant of the panel's own behind the link; attribute `address`, host and port."""
 
-    def __init__(self, machine: Machine, faults: Sequence[str]) -> None:
+    def __init__(self, machine: Machine, faults: Sequence[str], pace: float) -> None:
         """Start it, and wait until it listens; `faults` it offers to a trainer."""
-        super().__init__(serve_plant, machine, faults)
+        super().__init__(serve_plant, machine, faults, pace)
         self.address: tuple[str, int] = self._pipe.recv()
 
 

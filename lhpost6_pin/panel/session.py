@@ -55,14 +55,15 @@ class Session:
         work: Executor,
         facts: Mapping[str, Any],
         faults: Sequence[str] = (),
+        pace: float = 1.0,
     ) -> None:
         """Start the processes; `server` is one elsewhere, `facts` go into the attributes of records."""
         self._setup, self._folder, self._server, self._work, self._facts = setup, folder, server, work, dict(facts)
         self.machine, self._plant, self._numbers = setup.machine, make_plant(setup.machine), panel_numbers()
-        self._own = None if server else work.submit(PlantProcess, setup.machine, faults)
-        self._control = ControlProcess(setup)
+        self._own = None if server else work.submit(PlantProcess, setup.machine, faults, pace)
         self.layout = rows_of(setup.machine)
-        self._ring = RingReader(setup.ring, self.layout.width)
+        self._controls = 0
+        self._start_control()
         self.seats: dict[str, Seat] = {}
         self.operator: Seat | None = None
         self.status: Status | None = None
@@ -75,7 +76,15 @@ class Session:
         self.counts: dict[str, Any] = {"late": 0.0, "samples": 0, "holds": 0}
         self._program: Program | None = None
         self._offered, self.faults = tuple(faults), dict[str, bool]()
+        self._pace = pace
         self._motions: set[str] = set()
+
+    def _start_control(self) -> None:
+        """Start the controller's process, with a ring of its own."""
+        self._controls += 1
+        ring = self._setup.ring.with_name(f"ring-{self._controls}")
+        self._control = ControlProcess(self._setup._replace(ring=ring))
+        self._ring = RingReader(ring, self.layout.width)
 
     def close(self) -> None:
         """End the processes; a recording is saved."""
@@ -100,7 +109,7 @@ class Session:
         running = self.status is not None and self.status.state in ("running", "holding")
         self.journal.note(seat.name, "left the panel" + (" in mid-run: the program is stopped" if running else ""))
         if running:
-            self._control.order({"do": "stop", "by": seat.number, "who": seat.name})
+            self._control.order({"do": "stop", "by": seat.number, "who": seat.name, "what": ""})
 
     def role(self, seat: Seat) -> str:
         """Role of a seat."""
@@ -243,7 +252,7 @@ class Session:
         if address is None:
             assert self._own is not None
             if not self._own.result().alive:
-                self._own = self._work.submit(PlantProcess, self.machine, self._offered)
+                self._own = self._work.submit(PlantProcess, self.machine, self._offered, self._pace)
             address = self._own.result().address
         return {"do": "pressure", "to": "low", "host": address[0], "port": address[1], "what": "sets the pressure low"}
 
@@ -291,6 +300,9 @@ class Session:
         """Take the controller's messages and its new rows (n, width), which are returned."""
         for kind, content in self._control.news():
             self._heed(kind, content)
+        if not self._control.alive:
+            self._heed("lost", "the controller's process ended; another is started")
+            self._start_control()
         rows = self._ring.read()
         if len(rows):
             self._count(rows)

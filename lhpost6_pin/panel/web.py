@@ -54,7 +54,7 @@ class PanelServer:
         self._browsers: dict[str, Any] = {}
         self._sent: dict[str, int] = {}  # entries of the journal by browser
         machine = session.machine
-        self._scene = LiveScene(machine, machine.name, self._window)
+        self._scene = LiveScene(machine, machine.name, self._window, bare=True)
         self._capacity = plant_limits(make_plant(machine))
         self._work = ThreadPoolExecutor(1)
         self._number = 0

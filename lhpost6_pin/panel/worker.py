@@ -242,8 +242,8 @@ def _program_of(order: Mapping[str, Any]) -> Program | None:
     return Recorded(str(order["name"]), *rows)
 
 
-def serve_plant(pipe: Connection, machine: Machine, faults: Sequence[str]) -> None:
-    """Serve a plant in real time until the other end of the pipe is closed; sends its address first.
+def serve_plant(pipe: Connection, machine: Machine, faults: Sequence[str], pace: float) -> None:
+    """Serve a plant in real time, times `pace`, until the other end of the pipe is closed; sends its address first.
 
     The platen is parked where the machine says how low.
     """
@@ -261,5 +261,5 @@ def serve_plant(pipe: Connection, machine: Machine, faults: Sequence[str]) -> No
     threading.Thread(target=wait, daemon=True).start()
     with open_socket(port=0) as sock:
         pipe.send(sock.getsockname())
-        serve(sock, served, stop=stop)
+        serve(sock, served, stop=stop, pace=pace)
     os._exit(0)

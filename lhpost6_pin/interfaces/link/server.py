@@ -52,12 +52,16 @@ def serve(
     *,
     stop: threading.Event | None = None,
     seconds: float | None = None,
+    pace: float = 1.0,
 ) -> Timing:
     """Answer datagrams and move the plant until `stop` is set, Ctrl-C is pressed or `seconds` are over.
 
-    Real time: sample k of a run is due k/2048 s after its first command came, whatever became of those before. The
-    counts are in `served.counts`. Raises LinkError for a time that is negative or not finite.
+    Real time: sample k of a run is due k/2048 s after its first command came, whatever became of those before; `pace`
+    is a factor on the speed of that clock, below one for a computer that is too slow. The counts are in
+    `served.counts`. Raises LinkError for a time that is negative or not finite, or a pace that is not positive.
     """
+    if not 0.0 < pace < math.inf:
+        raise LinkError(f"a pace of {pace:g}; give a number above zero, 1 for real time")
     if seconds is not None and not 0.0 <= seconds < math.inf:
         raise LinkError(f"a plant cannot be served for {seconds:g} s; give a number, zero or more, or leave it out")
     stop, timing = stop or threading.Event(), Timing(Histogram(), Histogram())
@@ -76,14 +80,14 @@ def serve(
                     _listen_until(sock, served, now())
                     _tick(sock, served)
                     continue
-                due = begin + sample * SECOND // SAMPLE_RATE
+                due = begin + round(sample * SECOND / (SAMPLE_RATE * pace))
                 _listen_until(sock, served, due)
                 started = now()
                 _tick(sock, served)
                 ended = now()
                 timing.lateness.add(started - due)
                 timing.work.add(ended - started)
-                served.counts["missed_deadlines"] += ended > due + SECOND // SAMPLE_RATE
+                served.counts["missed_deadlines"] += ended > due + SECOND / (SAMPLE_RATE * pace)
         except KeyboardInterrupt:
             log.info("interrupted")
     return timing

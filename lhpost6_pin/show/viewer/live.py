@@ -39,16 +39,22 @@ class LiveScene:
     """
 
     def __init__(
-        self, machine: Machine, title: str, window: Callable[[str], SharedWindow], look: Look = AS_IT_IS
+        self,
+        machine: Machine,
+        title: str,
+        window: Callable[[str], SharedWindow],
+        look: Look = AS_IT_IS,
+        *,
+        bare: bool = False,
     ) -> None:
-        """Draw the machine in the `window` of its page; raises ParameterError as `Look.refuse`."""
+        """Draw the machine in the `window` of its page, `bare` without words; raises ParameterError as `Look.refuse`."""
         look.refuse()
         self._limits = plant_limits(make_plant(machine))
         self._machine, self._look = machine, look
         self._bodies = load_bodies(machine)
         self._names = [leg.name for leg in legs(machine)]
         note = f"{machine.name}, live, {look.size}; +X to the right"
-        self._window = window(render_page(Caption(title, note, machine_legend(machine)), live=True))
+        self._window = window(render_page(Caption(title, note, machine_legend(machine), bare=bare), live=True))
         draw_machine(self._window, machine, self._bodies)
         draw_arrows(self._window, self._names)
         draw_names(self._window, machine)

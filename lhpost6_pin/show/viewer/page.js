@@ -3,7 +3,8 @@ const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
 const part = (id) => document.getElementById(id);
 for (const packed of JSON.parse(part("commands").textContent))
   viewer.handle_command_bytearray(Uint8Array.from(atob(packed), (c) => c.charCodeAt(0)));
-const { start, step, live } = JSON.parse(part("settings").textContent);
+const { start, step, live, bare } = JSON.parse(part("settings").textContent);
+document.body.classList.toggle("bare", bare);
 const animator = viewer.animator;
 const shown = (seconds) => seconds.toFixed(2);
 const FITS = 1.5; // width over height in which the camera sees the whole table

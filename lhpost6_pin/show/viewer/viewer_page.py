@@ -25,6 +25,7 @@ class Caption:
     start: float = 0.0  # time of the first frame [s]
     step: float = 1.0 / 30.0  # of an arrow key [s]
     histories: Sequence[Mapping[str, Any]] = ()  # of `packed_histories`
+    bare: bool = False  # the scene alone, within another page
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ def render_page(caption: Caption, commands: Sequence[bytes] = (), *, live: bool 
         style=_beside("page.css"),
         library=library.read_text(encoding="utf-8").replace("</script", "<\\/script"),
         commands=json.dumps([base64.b64encode(command).decode("ascii") for command in commands]),
-        settings=json.dumps({"start": caption.start, "step": caption.step, "live": live}),
+        settings=json.dumps({"start": caption.start, "step": caption.step, "live": live, "bare": caption.bare}),
         histories=json.dumps(caption.histories).replace("<", "\\u003c"),
         script=_beside("page.js") + _beside("histories.js"),
     )

@@ -1,0 +1,312 @@
+"""The panel as a whole, its processes and its page: started, driven, tripped, reset, recorded, watched, abandoned."""
+
+import asyncio
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from urllib.request import Request, urlopen
+
+import numpy as np
+import pytest
+from browser import BROWSER, Tab, browse
+from tornado.websocket import websocket_connect
+
+from lhpost6_pin.data.records import load_record
+from lhpost6_pin.panel.worker import panel_numbers
+
+pytestmark = pytest.mark.long
+
+PACE = "0.15"
+"""Of real time: tests run beside others, and a table whose controller comes late moves otherwise."""
+PATIENCE = 120.0  # [s] for what takes seconds on a computer that does nothing else
+
+
+class Panel:
+    """A panel in a process of its own; `url`, `folder` of its recordings."""
+
+    def __init__(self, folder: Path, *more: str) -> None:
+        command = [sys.executable, "-c", "from lhpost6_pin.cli import main; main()", "panel", "--no-open"]
+        self.folder = folder / "panel"
+        command += ["--out", str(self.folder), "--pace", PACE, *more]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder)
+        assert self.process.stdout is not None
+        self.url = self.process.stdout.readline().split()[0]
+
+    def children(self) -> list[int]:
+        """Processes of the panel: of the controller and the plant, and Python's own."""
+        tasks = Path(f"/proc/{self.process.pid}/task").glob("*/children")
+        return [int(word) for task in tasks for word in task.read_text().split()]
+
+    def close(self, number: int = signal.SIGTERM) -> int:
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        code = self.process.wait(PATIENCE)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+        return code
+
+
+@pytest.fixture
+def panel(tmp_path):
+    found = Panel(tmp_path, "--trainer")
+    yield found
+    found.close(signal.SIGKILL)
+
+
+class Visitor:
+    """A browser's place without a browser: what the server sends, and orders."""
+
+    def __init__(self, url: str) -> None:
+        self._url = url.replace("http", "ws", 1) + "socket"
+        self.state: dict = {}
+        self.hello: dict = {}
+        self.refusals: list[str] = []
+        self.log: list[str] = []
+
+    async def __aenter__(self):
+        self._socket = await websocket_connect(self._url)
+        self._task = asyncio.create_task(self._listen())
+        await self.until(lambda: self.state)
+        return self
+
+    async def __aexit__(self, *_):
+        self._socket.close()
+        with contextlib.suppress(asyncio.CancelledError):
+            await asyncio.wait_for(self._task, 5.0)
+
+    async def _listen(self):
+        while (text := await self._socket.read_message()) is not None:
+            message = json.loads(text)
+            if message["kind"] == "state":
+                self.state = message
+                self.log += [f"{entry['who']} {entry['what']}" for entry in message["log"]]
+            elif message["kind"] == "hello":
+                self.hello = message
+            else:
+                self.refusals.append(message["what"])
+
+    async def do(self, do: str, **more):
+        await self._socket.write_message(json.dumps({"do": do, **more}))
+
+    async def until(self, wanted):
+        end = time.monotonic() + PATIENCE
+        while not wanted():
+            assert time.monotonic() < end, (self.state.get("trip"), self.refusals, self.log)
+            await asyncio.sleep(0.02)
+
+    async def refused(self, why: str, do: str, **more):
+        count = len(self.refusals)
+        await self.do(do, **more)
+        await self.until(lambda: len(self.refusals) > count)
+        assert why in self.refusals[-1], self.refusals[-1]
+
+    async def start(self, name: str):
+        """From nothing to a raised platen."""
+        await self.do("name", name=name)
+        await self.do("take")
+        await self.until(lambda: self.state["you"]["role"] == "operator")
+        for to in ("low", "high"):
+            await self.do("pressure", to=to)
+            await self.until(lambda to=to: self.state["pressure"] == to)
+        assert self.state["platen"] == "parked"
+        await self.do("raise")
+        await self.until(lambda: self.state["platen"] == "raised")
+
+
+def test_a_table_is_started_driven_tripped_reset_and_recorded(panel):
+    async def drive():
+        async with Visitor(panel.url) as anna:
+            await anna.refused("take the controls first", "run")
+            await anna.start("Anna")
+            await anna.refused("no program", "run")
+            await anna.refused("span of x is zero", "generator", wave="sine", frequency=0.5, axes=["x"])
+            await anna.refused("displacement limit is 0.89", "span", axis="x", value=2.0)
+            await anna.do("span", axis="x", value=0.1)
+            await anna.until(lambda: anna.state["span"][0] == 0.1)
+            await anna.refused("exceeds the capacity", "generator", wave="sine", frequency=8.0, axes=["x"])
+            await anna.do("record", on=True, name="by hand")
+            await anna.do("generator", wave="sine", frequency=1.0, cycles=2, axes=["x"])
+            await anna.until(lambda: anna.state["program"]["name"] == "sine 1 Hz")
+            await anna.do("fault", name="piston_leakage", where="H2", on=True)
+            await anna.until(lambda: any(fault["on"] for fault in anna.state["faults"]))
+            await anna.do("run")
+            await anna.until(lambda: anna.state["program"]["state"] == "running")
+            await anna.refused("stop it first", "motion", name="ridgecrest", scale=0.3, axes="xyz")
+            await anna.until(lambda: anna.state["program"]["state"] == "stopped")
+            await anna.do("record", on=False)
+            await anna.until(lambda: anna.state["recordings"])
+            await anna.do("interlock", name="displacement", limit=0.05)
+            await anna.do("setpoint", axis="x", value=0.2)
+            await anna.until(lambda: anna.state["trip"])
+            assert "displacement of x" in anna.state["trip"]
+            await anna.refused("still displacement of x", "reset")
+            await anna.do("interlock", name="displacement", limit=1.0)
+            await anna.do("setpoint", axis="x", value=0.0)
+            await anna.do("reset")
+            await anna.until(lambda: anna.state["trip"] is None)
+            return anna.state["recordings"], anna.log
+
+    recordings, log = asyncio.run(drive())
+    assert panel.close() == 0
+    record = load_record(recordings[0])
+    assert Path(recordings[0]).parent.name == "by_hand"
+    wanted, x = (record[f"{who}_displacement"].values[:, 0] for who in ("reference", "platen"))
+    assert np.abs(wanted).max() == pytest.approx(0.1, rel=0.01)
+    assert np.sqrt(np.mean((x - wanted) ** 2)) < 0.15 * np.sqrt(np.mean(wanted**2))
+    assert {"chamber_pressure_a", "spool_position", "strut_pressure", "supply_pressure"} <= set(record.data_vars)
+    said = "\n".join(log)
+    for words in (
+        "Anna sets the pressure high",
+        "switches the fault piston_leakage@H2 on",
+        "runs the program",
+        "trip:",
+    ):
+        assert words in said
+    entries = [json.loads(line) for line in (panel.folder / "journal.jsonl").read_text().splitlines()]
+    assert [f"{entry['who']} {entry['what']}" for entry in entries][: len(log)] == log
+
+
+def test_one_operates_others_watch_and_a_browser_that_leaves_in_mid_run_stops_the_program(panel):
+    async def drive():
+        async with Visitor(panel.url) as ben:
+            async with Visitor(panel.url) as anna:
+                await anna.start("Anna")
+                await ben.refused("another has the controls", "take")
+                await ben.refused("watchers do not drive", "span", axis="x", value=0.1)
+                await anna.do("span", axis="y", value=0.05)
+                await anna.until(lambda: anna.state["span"][1] == 0.05)
+                await anna.do("generator", wave="sine", frequency=0.5, axes=["y"])
+                await anna.until(lambda: anna.state["program"]["name"])
+                await anna.do("run")
+                await ben.until(lambda: ben.state["program"]["state"] == "running")
+                assert ben.state["operator"] == "Anna" and ben.state["watchers"] == 1
+            await ben.until(lambda: ben.state["program"]["state"] == "stopped")
+            assert ben.state["operator"] is None and ben.state["trip"] is None
+            await ben.do("take")
+            await ben.until(lambda: ben.state["you"]["role"] == "operator")
+            await ben.do("trip")  # anybody may
+            await ben.until(lambda: ben.state["trip"])
+            return ben.log
+
+    assert "Anna left the panel in mid-run: the program is stopped" in asyncio.run(drive())
+
+
+def listeners(pids: list[int]) -> dict[int, set[tuple[str, str]]]:
+    """Kind and address (as in /proc/net) of the sockets on which each process listens."""
+    owner = {}
+    for pid in pids:
+        for link in Path(f"/proc/{pid}/fd").iterdir():
+            with contextlib.suppress(OSError):
+                owner[os.readlink(link)] = pid
+    found: dict[int, set[tuple[str, str]]] = {pid: set() for pid in pids}
+    for table in ("tcp", "tcp6", "udp", "udp6"):
+        for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
+            fields = line.split()
+            connected = fields[2].split(":")[1] != "0000"
+            if (pid := owner.get(f"socket:[{fields[9]}]")) and not connected:
+                found[pid].add((table[:3], fields[1].split(":")[0]))
+    return found
+
+
+@pytest.mark.parametrize("which", ["plant", "controller"])
+def test_a_process_that_dies_is_announced_and_started_anew(panel, which):
+    async def drive():
+        async with Visitor(panel.url) as anna:
+            await anna.start("Anna")
+            served = {pid for pid, sockets in listeners(panel.children()).items() if ("udp", "0100007F") in sockets}
+            mapped = {pid for pid in panel.children() if "ring-1" in Path(f"/proc/{pid}/maps").read_text()}
+            (victim,) = served if which == "plant" else mapped
+            os.kill(victim, signal.SIGKILL)
+            await anna.until(lambda: anna.state["pressure"] == "off")
+            assert not anna.state["link"]["ok"]
+            if which == "controller":  # the plant is free again for another client after ten seconds of silence
+                await asyncio.sleep(11.0)
+            await anna.start("Anna")
+            return anna.log
+
+    said = {"plant": "does not answer", "controller": "the controller's process ended"}[which]
+    assert any(said in entry for entry in asyncio.run(drive()))
+
+
+def test_nothing_listens_beyond_this_computer_and_an_open_panel_needs_its_token(tmp_path):
+    for more, token in (((), False), (("--host", "0.0.0.0"), True)):
+        panel = Panel(tmp_path, *more)
+        try:
+            found = set().union(*listeners([panel.process.pid, *panel.children()]).values())
+            here = "0100007F"  # 127.0.0.1
+            assert {address for kind, address in found if kind == "udp"} <= {here}
+            assert {address for kind, address in found if kind == "tcp"} == {"00000000" if token else here}
+            if token:
+                bare, _, secret = panel.url.partition("?token=")
+                bare = bare.replace("0.0.0.0", "127.0.0.1")
+                for address in (bare, f"{bare}?token=wrong", f"{bare}view/"):
+                    with pytest.raises(OSError, match="403"):
+                        urlopen(address)
+                assert b"<html" in urlopen(f"{bare}?token={secret}").read()
+                cookie = {"Cookie": f"lhpost6_panel={secret}"}
+                assert urlopen(Request(f"{bare}panel.js", headers=cookie)).status == 200
+        finally:
+            panel.close(signal.SIGKILL)
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this computer")
+def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
+    async def press(tab: Tab, name: str):
+        await wait(tab, f"!document.getElementById('{name}').disabled", name)
+        await tab.evaluate(f"document.getElementById('{name}').click()")
+
+    async def enter(tab: Tab, name: str, value: str):
+        await wait(tab, f"!document.getElementById('{name}').disabled", name)
+        event = "new Event('change', { bubbles: true })"
+        await tab.evaluate(
+            f"{{ const box = document.getElementById('{name}'); box.value = '{value}'; box.dispatchEvent({event}) }}"
+        )
+
+    async def wait(tab: Tab, condition: str, what: str = ""):
+        end = time.monotonic() + PATIENCE
+        while not await tab.evaluate(f"Boolean({condition})"):
+            text = await tab.evaluate("document.getElementById('refusal').textContent")
+            assert time.monotonic() < end, (what or condition, text)
+            await asyncio.sleep(0.05)
+
+    def reads(name: str, word: str) -> str:
+        return f"document.getElementById('{name}').textContent.includes('{word}')"
+
+    async def look(tab: Tab):
+        await wait(tab, reads("machine", "LHPOST6"))
+        await enter(tab, "name", "Anna")
+        for name in ("take", "pressure-low", "pressure-high", "raise"):
+            await press(tab, name)
+        await wait(tab, reads("platen-state", "raised"))
+        await enter(tab, "span-x", "100")
+        await press(tab, "record")
+        await enter(tab, "frequency", "0.5")
+        await press(tab, "run")
+        await wait(tab, reads("program-state", "running"))
+        await wait(
+            tab, "Math.abs(parseFloat(document.getElementById('feedback-x').textContent.replace('−', '-'))) > 20"
+        )
+        await tab.picture(tmp_path / "driven.png")
+        await tab.key("Escape")
+        await wait(tab, "document.body.classList.contains('tripped')")
+        await press(tab, "reset")
+        await wait(tab, "!document.body.classList.contains('tripped')")
+        await press(tab, "record")
+        await wait(tab, reads("recordings", "record.nc"))
+        frame = "document.getElementById('view').contentDocument.getElementById('status')"
+        await wait(tab, f"{frame}.textContent.includes('force')", "the 3-D view")
+        return tab.faults
+
+    assert browse(tmp_path, panel.url, look, (1440, 900)) == []
+    (recording,) = panel.folder.glob("*/record.nc")
+    assert np.abs(load_record(recording)["platen_displacement"].values[:, 0]).max() > 0.02
+
+
+@pytest.mark.fast
+def test_the_numbers_of_the_panel_have_units_and_sources():
+    assert all(quantity.source for quantity in panel_numbers().quantities.values())

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..core.errors import LinkError, ParameterError
-from .app import command
+from .app import command, print_result
 from .completion import effect_names
 from .live_view import NoOpen, show_address
-from .options import SettingsName, SpecimenOptions, Valves, find_settings
+from .options import Json, SettingsName, SpecimenOptions, Valves, find_settings
 from .results_folder import folder_for
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ def panel(
         float, typer.Option(help="Speed of the table's clock; below 1 for a computer that is too slow for real time.")
     ] = 1.0,
     no_open: NoOpen = False,
+    json: Json = False,
 ) -> None:
     """Drive the table by hand from a page in a browser: start-up, setpoints, waves, motions, interlocks, recordings.
 
@@ -72,10 +73,12 @@ def panel(
                 page = PanelServer(session, host, port, trainer=trainer or bool(fault))
             except OSError as error:
                 raise LinkError(f"cannot listen on {host}:{port}: {error}; choose another --host or --port") from error
-            show_address(page.url, f"the panel of {table.name}; Ctrl-C ends", not no_open)
+            show_address(page.url, f"the panel of {table.name}; Ctrl-C ends", not no_open, err=json)
             asyncio.run(_serve(page))
         finally:
             session.close()
+    files = [Path(path) for path in session.recordings]
+    print_result(json, lambda: {"samples": session.answered, "late": session.missed}, lambda: None, files)
 
 
 async def _serve(page: "PanelServer") -> None:

@@ -215,6 +215,9 @@ def test_a_late_group_of_channels_is_named(plant, redundant):
     (fault,) = find_sensor_faults(plant, late, SENSORS)
     assert (fault.name, fault.family) == ("delay platen_acceleration", "channel_delay")
     assert fault.value == pytest.approx(3e-3, abs=3e-4)  # what calibration leaves open
+    ranges = SENSORS.delay_range
+    assert fault.reference == "platen_displacement"
+    assert fault.stated == ranges["platen_acceleration"] + ranges["platen_displacement"]
 
 
 def test_a_length_that_drifts_within_tests_is_a_fault_of_its_own(plant, redundant):

@@ -62,6 +62,7 @@ def prepare_problem(
     plant = make_plant(machine)
     policy = policy_of(numbers)
     records, delays = align_records(plant, records, policy)
+    removed = removed_delays(delays, sensors)
     rng = np.random.default_rng(seed)
 
     def prepared(record: xr.Dataset, policy: Policy) -> MeasuredTest:
@@ -80,7 +81,7 @@ def prepare_problem(
     again = [drawn(policy) for _ in range(int(n("fit.corrections")))]
     problem = Problem(
         *(machine, tests, noisy, sensors, comparison),
-        again=again, jobs=jobs, kinds=kinds, others=others(machine), preload=preload, delays=removed_delays(delays, sensors),
+        again=again, jobs=jobs, kinds=kinds, others=others(machine), preload=preload, delays=removed,
     )  # fmt: skip
     problem.specimen = specimen
     return problem

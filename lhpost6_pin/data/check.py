@@ -60,8 +60,8 @@ LIKELY_UNITS = {  # unit: least and greatest plausible peak, and the likely mist
 def check_record(path: Path | str, machine: Machine | None = None) -> list[RecordFinding]:
     """Contents and faults of the record at `path`; an unreadable file is one error.
 
-    With a `machine` forces are compared with its piston areas times the chamber pressures, and their signs with the
-    acceleration of its mass.
+    With a `machine` the record must be of it; its forces are compared with piston areas times the chamber pressures,
+    and their signs with the acceleration of its mass.
     """
     try:
         return check_dataset(open_record(path), machine)
@@ -71,7 +71,7 @@ def check_record(path: Path | str, machine: Machine | None = None) -> list[Recor
 
 def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[RecordFinding]:
     """List errors, then warnings, then the contents of a record in memory; see `check_record`."""
-    errors = layout_faults(dataset)
+    errors = layout_faults(dataset, None if machine is None else machine.labels)
     broken = {finding.channel.split("[")[0] for finding in errors}
     contents = [RecordFinding("info", *fact) for fact in _contents(dataset)]
     known = [name for name in LAYOUT if name in dataset and not {name, *LAYOUT[name].dims} & broken]

@@ -7,7 +7,7 @@ others may be added; those present must be valid: `load_record` refuses any othe
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -21,6 +21,9 @@ from ..core.names import AXES
 from .channels import LAYOUT, LAYOUT_VERSION
 from .layout_faults import RecordFinding, is_number, layout_faults, sampling_rate
 
+if TYPE_CHECKING:
+    from ..machine.machine import Machine
+
 __all__ = [
     "FULL_SCALE",
     "DEFLATE_LIMIT",
@@ -29,6 +32,7 @@ __all__ = [
     "load_record",
     "make_record",
     "open_record",
+    "refuse_other_machine",
     "require",
     "sample_interval",
     "save_record",
@@ -173,6 +177,17 @@ def require(dataset: xr.Dataset, *names: str) -> None:
     if missing:
         file = dataset.encoding.get("source", "the record")
         raise RecordError(f"{file}: has no {', '.join(missing)}; it has {', '.join(map(str, dataset.data_vars))}")
+
+
+def refuse_other_machine(machine: "Machine", dataset: xr.Dataset) -> None:
+    """Raise `RecordError` for a record whose components are not those of a machine."""
+    for dim, names in machine.labels.items():
+        if dim in dataset.coords and [str(x) for x in dataset[dim].values] != list(names):
+            raise RecordError(
+                f"{dataset.encoding.get('source', 'the record')}: has {dim}s "
+                f"{' '.join(map(str, dataset[dim].values))}, {machine.name} has {' '.join(names)}; name its machine "
+                "with --machine"
+            )
 
 
 def _refuse(faults: Sequence[RecordFinding], source: str) -> None:

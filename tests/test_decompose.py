@@ -9,7 +9,7 @@ from run_cases import RATE, every_step
 from sensor_cases import measured
 
 from lhpost6_pin.core.errors import RecordError
-from lhpost6_pin.data.records import load_record, open_record
+from lhpost6_pin.data.records import load_record, open_record, sample_interval
 from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.identification.decompose import decompose_record, find_agreement, find_work, save_ledger
 from lhpost6_pin.identification.decompose.dataset import delivered_by
@@ -217,6 +217,7 @@ def test_records_of_other_machines_specimens_and_too_short_ones_are_refused(tria
         (MACHINE, triangle.assign_attrs(specimen="tower"), {}, "mount it with --specimen"),
         (MACHINE, triangle.isel(time=slice(0, 600)), {}, "too short"),
         (MACHINE, triangle, {"cutoff": 0.0}, "cutoff must be above zero"),
+        (MACHINE, triangle, {"cutoff": 0.75 / sample_interval(triangle)}, "show nothing above .* give a cutoff below"),
     ):
         with pytest.raises(RecordError, match=message):
             decompose_record(machine, record, **options)

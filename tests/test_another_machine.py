@@ -60,7 +60,7 @@ def test_calibrate_names_the_option(lhpost6, own):
 def test_a_wrong_order_of_the_machines_own_labels_is_no_other_machine(machine):
     names = list(machine.actuator_names)
     record = make_record(
-        np.arange(4) / 512.0, {"actuator_force": np.zeros((4, len(names)))}, {"actuator": names[:-1] + ["V9"]}, {}
+        np.arange(4) / 512.0, {"actuator_force": np.zeros((4, len(names)))}, {"actuator": [*names[:-1], "V9"]}, {}
     )
     found = [str(f) for f in check_dataset(record, machine) if f.severity == "error"]
     assert len(found) == 1 and "--machine" in found[0]

@@ -6,6 +6,7 @@ others may be added; those present must be valid: `load_record` refuses any othe
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +46,8 @@ DEFLATE_LIMIT = 5000  # no compressed netCDF unpacks to more than this (deflate 
 
 
 # ---------------------------------------------------------------------------------------------- disk
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
 FULL_SCALE = "full_scale_force"
 """Attribute of a record: force [N] at which an arrow of the viewer has its full length."""
 
@@ -55,8 +58,7 @@ def open_record(path: Path | str) -> xr.Dataset:
     The file stays as it is. Raises `RecordError`, naming the file, if it is missing, not netCDF-4, or damaged.
     """
     path = Path(path)
-    if not path.is_file():
-        raise RecordError(f"{path}: no such file")
+    _refuse_no_record(path)
     try:
         with h5py.File(path) as file:  # h5netcdf complains to the terminal of a file whose attributes are damaged
             _ = dict(file.attrs)
@@ -72,6 +74,20 @@ def open_record(path: Path | str) -> xr.Dataset:
         raise RecordError(
             f"{path}: not a netCDF-4 (HDF5) file, or damaged: {error}; make or export the record again"
         ) from error
+
+
+def _refuse_no_record(path: Path) -> None:
+    """Raise `RecordError` for a directory, a missing file, and one without the first bytes of HDF5."""
+    imported = "`lhpost6 import` makes records of measured data (CSV, .mat, ...)"
+    if path.is_dir():
+        within = sorted(path.glob("*.nc"))
+        what = f"; name one record of it, such as {within[0]}" if within else f" without records (.nc); {imported}"
+        raise RecordError(f"{path}: is a directory{what}")
+    if not path.is_file():
+        raise RecordError(f"{path}: no such file")
+    with suppress(OSError), path.open("rb") as file:  # what cannot be read is an error of opening it
+        if file.read(len(_HDF5)) != _HDF5:
+            raise RecordError(f"{path}: not a netCDF-4 (HDF5) file; {imported}")
 
 
 def _brought_up(dataset: xr.Dataset) -> xr.Dataset:

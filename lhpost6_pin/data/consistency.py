@@ -46,8 +46,8 @@ MOST_NOISE = 0.1  # share of noise in a column, less the others, above which its
 class ConsistencyFinding:
     """One number by which two sensors (or a sensor and a law) were compared.
 
-    `tolerance` covers errors of calibration and geometry, at least three deviations but of delays; `standard_error` is that of the
-    noise. A gain or delay is "untested" where noise is too large: a standard error beyond the tolerance, or more than
+    `tolerance` covers errors of calibration and geometry, at least three deviations except for delays; `standard_error`
+    is that of the noise. A gain or delay is "untested" where noise is too large: a standard error beyond the tolerance, or more than
     a tenth of the regressor's power. `instead` are untested quantities that would have the same effect: where nothing
     varies, an offset may be a gain.
     """

@@ -47,9 +47,9 @@ class ConsistencyFinding:
     """One number by which two sensors (or a sensor and a law) were compared.
 
     `tolerance` covers errors of calibration and geometry, at least three deviations except for delays; `standard_error`
-    is that of the noise. A gain or delay is "untested" where noise is too large: a standard error beyond the tolerance, or more than
-    a tenth of the regressor's power. `instead` are untested quantities that would have the same effect: where nothing
-    varies, an offset may be a gain.
+    is that of the noise. A gain or delay is "untested" where noise is too large: a standard error beyond the tolerance,
+    or more than a tenth of the regressor's power. `instead` are untested quantities that would have the same effect:
+    where nothing varies, an offset may be a gain.
     """
 
     check: str

@@ -1,5 +1,6 @@
 """Commands that connect the virtual table to other programs: serve, link, export-fmu."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -149,6 +150,7 @@ def link(
     with LinkClient(host, port) as client, progress_bar(f"{name} at {host}:{port}") as progress:
         done = run_over_link(client, plant, loop, progress=progress)
         counts = dict(client.close())
+    done = replace(done, holds=counts.get("holds", 0))
     counts |= {"resent": client.resent, "sensors_lost": client.sensors_lost, "ignored": client.ignored}
     counts["unanswered"] = int((~done.answered).sum())
     attrs = {"test": name, "title": f"{target.reference.title} over the link", "link_mode": client.mode.label}

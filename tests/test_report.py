@@ -322,6 +322,12 @@ def test_the_governing_limit_comes_first_and_every_quantity_has_its_row(tmp_path
     named = re.findall('<th scope="row">(.*?)</th>', rows)
     others = {"Displacement", "Velocity", "Acceleration", "Actuator stroke", "Spool"}
     assert named[0] == "Actuator velocity" and set(named[1:]) == others
+    assert re.search(r">Spool</th>.{0,60}?[\d.]+ of the stroke<", rows)
+
+
+def test_commands_in_banners_and_notes_are_set_as_code():
+    page = render_page(Page("Kind", "Title", "Purpose", "Run `lhpost6 check <a>`.", "good", (), (), notes=["a `b`"]))
+    assert "Run <code>lhpost6 check &lt;a&gt;</code>." in page and "<li>a <code>b</code></li>" in page
 
 
 @pytest.mark.parametrize(("share", "beyond"), [(0.9995, False), (1.0005, False), (1.002, True)])

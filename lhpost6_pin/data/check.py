@@ -109,7 +109,7 @@ def _contents(dataset: xr.Dataset) -> Iterator[_Warning]:
     yield from (("", None, sentence, "") for sentence in changes_summary(dataset.attrs))
     for name, variable in dataset.data_vars.items():
         if variable.dtype.kind in "fiu" and variable.size and np.isfinite(variable).any():
-            yield from _extents(variable, "" if name in LAYOUT else ", not of the layout")
+            yield from _extents(variable, "" if name in LAYOUT else ", a further channel")
     for job in sorted({job for channel in LAYOUT.values() for job in channel.needed_by}):
         missing = [name for name, it in LAYOUT.items() if job in it.needed_by and not _given(dataset, name)]
         if missing:

@@ -9,7 +9,9 @@ import pytest
 from commands import refused
 from page_cases import Reader
 
+from lhpost6_pin.data.alignment import Delay
 from lhpost6_pin.data.campaign import Campaign, load_campaign
+from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.identification.calibration import Calibration, Subset, calibration_numbers, machine_parameters
 from lhpost6_pin.identification.calibration.calibration_summary import (
     contradiction_summary,
@@ -24,7 +26,7 @@ from lhpost6_pin.identification.calibration.result import (
     out_of_range,
     verdict_on,
 )
-from lhpost6_pin.identification.calibration.sensor_errors import RemovedDelay, SensorUnknown
+from lhpost6_pin.identification.calibration.sensor_errors import RemovedDelay, SensorUnknown, removed_delays
 from lhpost6_pin.identification.residuals import RESIDUALS
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.show.report.calibrate_plots import INTERVAL
@@ -84,10 +86,11 @@ def page_of(calibration: Calibration, folder: Path) -> str:
 
 
 def test_a_delay_beyond_its_stated_range_that_was_removed_first_is_not_passed_over(found, tmp_path, capsys):
-    late = RemovedDelay("platen_acceleration", 9e-3, 5e-6, 2e-3)
-    known = RemovedDelay("actuator_force", 1e-3, 5e-6, 2e-3)
+    late = RemovedDelay("platen_acceleration", 9e-3, 5e-6, 2e-3, "platen_displacement")
+    known = RemovedDelay("actuator_force", 1e-3, 5e-6, 2e-3, "chamber_pressure")
     told = replace(found, delays=(known, late))
-    words = "Delays beyond their stated ranges, removed before the fit: platen_acceleration 9 ms (stated: at most 2 ms)"
+    words = "Delays beyond their stated ranges, removed before the fit: platen_acceleration 9 ms relative to "
+    words += "platen_displacement (stated of both: at most 2 ms)"
     assert delay_summary(told) == f"{words}." and delay_summary(replace(found, delays=(known,))) == ""
     print_calibration(told)
     assert words in " ".join(capsys.readouterr().out.split()) and words in page_of(told, tmp_path)
@@ -95,6 +98,18 @@ def test_a_delay_beyond_its_stated_range_that_was_removed_first_is_not_passed_ov
 
 
 # ---------------------------------------------------------------------------------------- verdicts
+def test_a_delay_between_two_groups_may_be_as_large_as_the_ranges_of_both_together():
+    sensors = load_sensors()
+    allowed = sensors.delay_range["platen_velocity"] + sensors.delay_range["platen_displacement"]
+    delays = {
+        "platen_velocity": Delay("platen_displacement", -0.8 * allowed, 2e-6, 6),  # beyond the range of either alone
+        "platen_acceleration": Delay("platen_displacement", 1.2 * allowed, 2e-6, 6),
+    }
+    within, beyond = removed_delays(delays, sensors)
+    assert within.stated == allowed and within.reference == "platen_displacement"
+    assert not within.beyond(3.0) and beyond.beyond(3.0)
+
+
 def test_a_parameter_is_changed_beyond_three_deviations_and_not_informed_near_its_prior(found):
     assert dict(zip(found.names, (verdict_on(found, i) for i in range(5)), strict=False)) == {
         "platen.mass[x]": "changed",

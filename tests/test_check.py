@@ -79,6 +79,9 @@ def test_what_a_record_cannot_be_used_for_is_said(tests):
 def test_further_variables_are_listed_and_not_judged(tests):
     extra = tests["TX"].assign(oil_temperature=("time", np.full(5632, np.nan)), note=((), "hot"))
     assert faults(check_dataset(extra)) == []
+    ours = tests["TX"].assign(supply_flow=("time", np.ones(5632)))  # the package's own
+    listed = next(f.message for f in check_dataset(ours) if f.channel == "supply_flow")
+    assert listed.endswith(", a further channel")
 
 
 def test_noise_free_rest_and_motion_along_one_axis_are_not_taken_for_dead_or_stuck_channels():

@@ -195,7 +195,8 @@ def test_check_of_a_campaign_begins_its_summary_with_a_line_for_each_test(lhpost
 def test_check_of_what_is_no_record_exits_1_and_names_it(lhpost6, tmp_path, name):
     (tmp_path / "a folder").mkdir()
     ended = lhpost6("check", name)
-    assert ended.code == 1 and f"{name}: no such file" in ended.words
+    why = "is a directory without records" if name == "a folder" else "no such file"
+    assert ended.code == 1 and f"{name}: {why}" in ended.words
 
 
 # Running --------------------------------------------------------------------------------------------------------------

@@ -215,6 +215,20 @@ def test_a_late_group_of_channels_is_named(plant, redundant):
     (fault,) = find_sensor_faults(plant, late, SENSORS)
     assert (fault.name, fault.family) == ("delay platen_acceleration", "channel_delay")
     assert fault.value == pytest.approx(3e-3, abs=3e-4)  # what calibration leaves open
+    ranges = SENSORS.delay_range
+    assert fault.reference == "platen_displacement"
+    assert fault.stated == ranges["platen_acceleration"] + ranges["platen_displacement"]
+
+
+def test_a_delay_is_accepted_up_to_the_ranges_of_both_sensors_and_no_further(plant, redundant):
+    both = SENSORS.delay_range["platen_acceleration"] + SENSORS.delay_range["platen_displacement"]
+    verdicts = []
+    for share in (0.9, 1.1):  # three deviations of both together would be 1.22 of the sum
+        late = with_change(redundant, "platen_acceleration", lambda x, share=share: align(x, -share * both, 1 / RATE))
+        found = find(check_sensors(plant, late, SENSORS), "platen_acceleration[x]", "delay")
+        assert found.estimate == pytest.approx(share * both, rel=0.05)  # the regression's second-order term
+        verdicts.append(found.verdict)
+    assert verdicts == ["ok", "suspicious"]
 
 
 def test_a_length_that_drifts_within_tests_is_a_fault_of_its_own(plant, redundant):

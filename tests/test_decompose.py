@@ -1,6 +1,7 @@
 """Records taken apart: exact without noise, left at the noise's level with it, and honest about what is not."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,12 +10,12 @@ from run_cases import RATE, every_step
 from sensor_cases import measured
 
 from lhpost6_pin.core.errors import RecordError
-from lhpost6_pin.data.records import load_record, open_record
+from lhpost6_pin.data.records import load_record, open_record, sample_interval
 from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.identification.decompose import decompose_record, find_agreement, find_work, save_ledger
 from lhpost6_pin.identification.decompose.dataset import delivered_by
 from lhpost6_pin.identification.inverse_dynamics import leg_wrenches
-from lhpost6_pin.show.report.decompose_report import write_decompose_report
+from lhpost6_pin.show.report.decompose_report import match_tables, residual_tables, write_decompose_report
 from lhpost6_pin.simulation.outputs import record_of_run
 
 pytestmark = pytest.mark.long
@@ -217,6 +218,18 @@ def test_records_of_other_machines_specimens_and_too_short_ones_are_refused(tria
         (MACHINE, triangle.assign_attrs(specimen="tower"), {}, "mount it with --specimen"),
         (MACHINE, triangle.isel(time=slice(0, 600)), {}, "too short"),
         (MACHINE, triangle, {"cutoff": 0.0}, "cutoff must be above zero"),
+        (MACHINE, triangle, {"cutoff": 0.75 / sample_interval(triangle)}, "show nothing above .* give a cutoff below"),
     ):
         with pytest.raises(RecordError, match=message):
             decompose_record(machine, record, **options)
+
+
+def test_the_tutorial_names_the_tables_and_columns_that_are_printed(practice):
+    found, agreement = practice
+    tables = [*residual_tables(found, agreement), *match_tables(found, agreement)]
+    page = (Path(__file__).parents[1] / "scripts/docs/pages/tutorials/forces.md").read_text()
+    first, mean, total, *_ = (table.caption for table in tables)
+    named = [page.index(f"*{title.partition(':')[0]}*") for title in (first, mean, total)]
+    assert named == sorted(named)
+    assert all(f"*{column}*" in page for column in ("Ratio", "Sensors", "Parameters", "Sufficient explanation"))
+    assert set(tables[0].header) >= {"Ratio", "Sensors", "Parameters", "Sufficient explanation"}

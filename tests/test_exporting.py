@@ -1,6 +1,7 @@
 """Exported records hold units in their names and come back the same; the two commands from end to end."""
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -137,3 +138,13 @@ def test_an_export_is_imported_without_a_map(lhpost6, tmp_path, record):
 def test_a_command_that_cannot_go_on_says_why(lhpost6, tmp_path, arguments, phrase):
     (tmp_path / "run.csv").write_text("time [s],x\n0,1\n1,2\n")
     assert refused(lhpost6(*arguments), phrase)
+
+
+def test_the_first_line_of_an_exported_table_that_is_no_comment_names_columns_with_units(tmp_path, record):
+    """As `tutorials/data.md` shows it."""
+    export_record(record, tmp_path / "a.csv", "csv")
+    lines = (tmp_path / "a.csv").read_text().splitlines()
+    names = next(line for line in lines if not line.startswith("#")).split(",")
+    assert names[0] == "time [s]" and all(name.endswith("]") for name in names)
+    page = (Path(__file__).parents[1] / "scripts/docs/pages/tutorials/data.md").read_text()
+    assert "grep -v '^#' TX_si.csv | head -n 1" in page

@@ -417,12 +417,14 @@ def test_without_pythonfmu_or_the_right_suffix_nothing_is_exported(tmp_path, mon
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_command_line_exports_a_machine_with_its_changes(lhpost6, tmp_path):
+def test_the_command_line_exports_a_machine_with_its_changes(lhpost6, tmp_path, caplog, monkeypatch):
     changes = tmp_path / "change.toml"
     changes.write_text("[platen]\nmass = { value = [150e3, 150e3, 160e3], unit = 'kg' }\n")
     out = tmp_path / "new" / "table.fmu"
     ended = lhpost6("export-fmu", "--override", changes, "--valves", "2", "--out", out)
-    assert ended.code == 0 and str(out) in ended.out.replace("\n", "")
+    assert ended.code == 0 and str(out) in ended.out.replace("\n", "") and "will be replaced" not in caplog.text
+    monkeypatch.setattr("lhpost6_pin.interfaces.fmi.export_fmu", lambda *_: None)
+    assert lhpost6("export-fmu", "--out", out).code == 0 and "an earlier FMU will be replaced" in caplog.text
     machine, _ = load_machine_file(Path(fmpy.extract(str(out), str(tmp_path / "a"))) / "resources")
     assert machine.platen.mass == (150e3, 150e3, 160e3)
     assert {a.valves for a in machine.actuators if a.area_b is not None} == {2}

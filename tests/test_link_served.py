@@ -460,3 +460,14 @@ def test_no_time_at_all_has_no_percentile_and_one_beyond_the_last_bin_is_still_t
     assert histogram.percentile(50.0) == 0.0
     histogram.add(10**9)
     assert histogram.largest == 1.0 and histogram.percentile(50.0) <= 1.0
+
+
+@pytest.mark.parametrize("late", [0.0195, 0.05, 2.0, 600.0])
+def test_times_beyond_the_fine_bins_have_percentiles_of_their_own(late: float):
+    histogram = Histogram()
+    for _ in range(9):
+        histogram.add(round(late * 1e9))
+    histogram.add(round(3.0 * late * 1e9))
+    # a bin is one per cent wide from 20 ms on, one microsecond below
+    assert late <= histogram.percentile(50.0) <= 1.01 * late + 1e-6
+    assert histogram.percentile(99.0) == histogram.largest

@@ -40,6 +40,7 @@ from lhpost6_pin.interfaces.link import (
     serve,
 )
 from lhpost6_pin.interfaces.link.clock import Histogram
+from lhpost6_pin.interfaces.link.link_summary import link_entries, print_link, too_slow
 from lhpost6_pin.interfaces.link.remote import LinkRun
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.coupled import BaseMotion
@@ -205,6 +206,48 @@ def test_a_run_that_went_to_its_safe_hold_is_in_trouble(plant, rest, holding, si
     run = LinkRun(none, none, np.zeros((n, 6)), [still] * n, none, state, answered, False, 1.0)
     assert (run.trouble or "none").partition(";")[0] == (trouble or "none")
     assert record_of_link_run(run, plant, {}).attrs["trouble"] == (run.trouble or "none")
+
+
+def test_the_verdict_counts_the_safe_holds_that_the_server_counted(plant):
+    """The controller misses those that end before the next sensors come."""
+    n, none = 1000, np.zeros((1000, 10))
+    state = np.full(n, PlantState.RUNNING, np.int8)
+    still = BaseMotion(pin.SE3.Identity(), pin.Motion.Zero(), pin.Motion.Zero())
+    run = LinkRun(none, none, np.zeros((n, 6)), [still] * n, none, state, np.ones(n, bool), False, 1.0, holds=3)
+    assert run.trouble is None  # after its end, when commands stop
+    state[500:600] = PlantState.HOLD
+    assert "3 safe holds, the first at 0.2441 s" in (run.trouble or "")
+
+
+def test_a_server_that_is_lost_in_mid_run_leaves_the_run_up_to_there(plant, rest):
+    samples, stop = 400, 150
+    with served(plant, rest) as (table, address):
+        client = LinkClient(*address, timeout=0.01, tries=3)
+        receive = table.receive
+
+        def until(datagram, sender, at):
+            return receive(datagram, sender, at) if table.sample < stop else []
+
+        table.receive = until
+        with client:
+            run = run_over_link(client, plant, PluggedLoop(Proportional(), *wanted(samples), rest))
+    # the command of the last sample was given; sensors after it never came
+    assert len(run.answered) == stop + 1 and run.answered.all()
+    trouble = (
+        f"lost the server at {len(run.answered) / 2048:.4f} s: {address[0]}:{address[1]} answered up to sample {stop}"
+    )
+    assert (run.trouble or "").startswith(trouble) and "start the plant" not in run.trouble
+    record = record_of_link_run(run, plant, {})
+    assert record.sizes["time"] == stop + 1 and record.attrs["trouble"] == run.trouble
+
+
+@pytest.mark.parametrize(("missed", "said"), [(0, False), (5, False), (500, True)])
+def test_a_computer_too_slow_for_real_time_is_said_to_be(capsys, missed, said):
+    counts = {"samples": 1000, "missed_deadlines": missed}
+    print_link("table", counts, {})
+    assert ("too slow for real time: 50 % of the samples" in " ".join(capsys.readouterr().out.split())) == said
+    assert link_entries(counts, {})["too_slow"] == said
+    assert too_slow({}) == ""
 
 
 def test_a_trip_ends_the_run_and_the_next_client_finds_the_plant_at_rest(plant, rest):

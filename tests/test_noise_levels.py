@@ -192,6 +192,28 @@ def test_noise_is_compared_with_what_a_file_states(tests, factor, phrase):
     assert not found["platen_displacement[x]"].warning
 
 
+def test_noise_read_above_the_stated_low_pass_is_not_compared_and_its_statement_is_that_below_it():
+    """Without a rest the flat part of a spectrum may lie where the recorder's filter leaves nothing."""
+    stated = sensors(256.0, 20.0)
+    (one,) = [x for x in noise_levels([add_noise(shaken(1), sensors(256.0, 120.0), np.random.default_rng(0))])
+              .channels.values() if x.channel == "pressure_difference"]  # fmt: skip
+    levels = noise_levels([shaken(1)])._replace(channels={one.channel: one._replace(low=90.0, high=110.0)}, rate=256.0)
+    (found,) = compare_noise(levels, stated)
+    # white noise at the rate of the records, beside a step of the converter far below it
+    assert found.stated == pytest.approx(TRUE["pressure_difference"][0], rel=0.01)
+    assert np.isnan(found.ratio) and not found.warning
+    (below,) = compare_noise(levels._replace(channels={one.channel: one._replace(low=5.0, high=15.0)}), stated)
+    assert below.stated == pytest.approx(TRUE["pressure_difference"][0], rel=0.01) and not np.isnan(below.ratio)
+
+
+def test_round_off_of_a_computed_column_is_no_noise(tests):
+    computed = [r.copy(deep=True) for r in tests]
+    for record in computed:
+        record["platen_acceleration"][:, 5] = 1e-33 * np.random.default_rng(3).standard_normal(record.sizes["time"])
+    density = noise_levels(computed).channels["platen_acceleration"].density
+    assert density[0] > 0 and density[5] == 0.0
+
+
 def test_noise_that_a_file_states_wrongly_is_replaced_by_that_of_the_records_and_no_other(tests, tmp_path, caplog):
     content = measured_sensors(PLANT, tests)
     stated = content.quantities["noise.pressure_difference"]

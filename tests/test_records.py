@@ -16,7 +16,7 @@ from lhpost6_pin.data import layout_faults as layout_faults_module
 from lhpost6_pin.data import records
 from lhpost6_pin.data.channels import LAYOUT, LAYOUT_VERSION, channel_name, same_unit
 from lhpost6_pin.data.layout_faults import layout_faults
-from lhpost6_pin.data.records import load_record, make_record, require, save_record
+from lhpost6_pin.data.records import load_record, make_record, open_record, require, save_record
 
 RECORDS = Path(__file__).parent / "data" / "records"
 SIZES = {"axis": 6} | {dim: len(labels) for dim, labels in LABELS.items()}
@@ -241,9 +241,8 @@ def test_what_is_not_there_or_not_netcdf_is_refused_by_name(tmp_path: Path) -> N
     (tmp_path / "empty.nc").touch()
     (tmp_path / "hdf5.nc").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(range(256)))
     (tmp_path / "cdf.nc").write_bytes(b"CDF\x01" + bytes(range(256)))
-    for name in ("absent.nc", "."):
-        with pytest.raises(RecordError, match="no such file"):
-            load_record(tmp_path / name)
+    with pytest.raises(RecordError, match="no such file"):
+        load_record(tmp_path / "absent.nc")
     for name in ("table", "empty", "hdf5", "cdf"):
         with pytest.raises(RecordError, match=rf"{name}\.nc: not a netCDF-4"):
             load_record(tmp_path / f"{name}.nc")
@@ -298,3 +297,20 @@ def test_a_record_in_single_precision_keeps_time_units_and_seven_figures(tmp_pat
         np.testing.assert_allclose(found[name].values, column.values, rtol=2**-24)  # half a unit of the last place
     sizes = [(tmp_path / name).stat().st_size for name in ("half.nc", "whole.nc")]
     assert sizes[0] < 0.7 * sizes[1]  # half, and what the file says of itself
+
+
+def test_what_is_no_record_is_named_with_what_to_do(tmp_path):
+    """A directory, one of data files, and a data file of another format."""
+    data, records = tmp_path / "data", tmp_path / "records"
+    for folder in (data, records):
+        folder.mkdir()
+    (data / "TX.csv").write_text("time,x\n0,0\n")
+    (records / "TX.nc").write_bytes(PRACTICE.read_bytes())
+    for path, words in (
+        (data, "is a directory without records .*`lhpost6 import`"),
+        (records, "is a directory; name one record of it, such as .*TX.nc"),
+        (data / "TX.csv", "not a netCDF-4 .*`lhpost6 import` makes records of measured data"),
+        (data / "TY.csv", "no such file"),
+    ):
+        with pytest.raises(RecordError, match=words):
+            open_record(path)

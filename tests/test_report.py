@@ -20,7 +20,7 @@ from lhpost6_pin.data.metrics import QUANTITIES
 from lhpost6_pin.show.report.page import Page, bar, number, render_page, text
 from lhpost6_pin.show.report.plots import ACHIEVED, Row, Trace, envelope, time_figure
 from lhpost6_pin.show.report.run_report import RunSummary, lead_summary, write_run_report
-from lhpost6_pin.show.report.scales import SCALES
+from lhpost6_pin.show.report.scales import SCALES, Scale, percent, scaled_number, shown_as
 
 AXES = ["x", "y", "z", "roll", "pitch", "yaw"]
 ACTUATORS = ["H1", "H2", "H3", "H4", "V1", "V2", "V3", "V4", "V5", "V6"]
@@ -322,6 +322,12 @@ def test_the_governing_limit_comes_first_and_every_quantity_has_its_row(tmp_path
     named = re.findall('<th scope="row">(.*?)</th>', rows)
     others = {"Displacement", "Velocity", "Acceleration", "Actuator stroke", "Spool"}
     assert named[0] == "Actuator velocity" and set(named[1:]) == others
+    assert re.search(r">Spool</th>.{0,60}?[\d.]+ of the stroke<", rows)
+
+
+def test_commands_in_banners_and_notes_are_set_as_code():
+    page = render_page(Page("Kind", "Title", "Purpose", "Run `lhpost6 check <a>`.", "good", (), (), notes=["a `b`"]))
+    assert "Run <code>lhpost6 check &lt;a&gt;</code>." in page and "<li>a <code>b</code></li>" in page
 
 
 @pytest.mark.parametrize(("share", "beyond"), [(0.9995, False), (1.0005, False), (1.002, True)])
@@ -587,3 +593,10 @@ def test_a_browser_draws_every_plot_without_an_error_and_zooms_all_time_axes_tog
     assert found["linked"] == [2, 4]
     assert found["moved"] == pytest.approx([2.4, 4.4])  # a fifth of the window
     assert found["reset"] == pytest.approx([0.0, 8.0 - 1 / 512])
+
+
+def test_round_off_is_shown_as_zero_and_small_quantities_are_not():
+    assert shown_as(6.2e-9, Scale(1e-6, "MN m")).split() == ["0", "MN", "m"]  # a moment that symmetry makes zero
+    assert percent(1.09e-14).split() == ["0", "%"] and percent(float("nan")) == "–"
+    assert shown_as(2.4e-6, Scale(1e3, "mm")).startswith("0.0024")
+    assert scaled_number(float("nan"), Scale(1.0, "N")) == "–"

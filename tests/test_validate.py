@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,15 +14,18 @@ from machine_cases import PRACTICE
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import RecordError
 from lhpost6_pin.data.campaign import Campaign, load_campaign, save_campaign
+from lhpost6_pin.data.channels import LAYOUT
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.data.signals import Band, align, resample_band_limited
 from lhpost6_pin.discovery.floor import normalised_error
-from lhpost6_pin.identification.validation import PHASES, ComparedQuantity, Phase, metrics, validate
+from lhpost6_pin.identification.validation import PHASES, ComparedQuantity, Phase, metrics, phases, validate
 from lhpost6_pin.identification.validation.phase_agreement import MOTIONS, agree
-from lhpost6_pin.identification.validation.prepare_tests import validation_numbers
+from lhpost6_pin.identification.validation.phases import run_phase
+from lhpost6_pin.identification.validation.prepare_tests import validation_numbers, wrench_calibration
 from lhpost6_pin.identification.validation.spectra import find_peak, find_valves
 from lhpost6_pin.mechanics.linearize import oil_column_modes
+from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.show.report.validate_report import write_validate_report
 from lhpost6_pin.simulation.rehearse import rehearse
@@ -411,3 +415,34 @@ def test_the_command_leaves_report_and_metrics(lhpost6, coarse, tmp_path):
 @pytest.mark.parametrize("phases", ["", "4", "1;2"])
 def test_phases_that_do_not_exist_are_refused(lhpost6, phases, tmp_path):
     assert refused(lhpost6("validate", tmp_path, "--phases", phases), "1,2,3")
+
+
+@pytest.mark.parametrize("name", ["actuator_force", "pressure_difference", "chamber_pressure_a"])
+def test_the_mean_of_a_wrench_is_as_uncertain_as_the_sensors_that_its_forces_come_from(table, name):
+    """Forces come from load cells, else from pressures times areas; an offset alone shows, as all means are zero."""
+    actuator, given = (
+        table.actuators[0],
+        replace(load_sensors(), gain_range={}, offset_range=dict.fromkeys(LAYOUT, 2.0)),
+    )
+    names = {"chamber_pressure_a": ("chamber_pressure_a", "chamber_pressure_b")}.get(name, (name,))
+    measured = SimpleNamespace(channels={one: np.zeros((4, 1)) for one in names})
+    test = SimpleNamespace(basis=SimpleNamespace(sensors=given), plant=make_plant(table), test=measured)
+    areas = {"actuator_force": [1.0], "pressure_difference": [actuator.area_a]}.get(
+        name, [actuator.area_a, actuator.area_b]
+    )
+    due = 2.0 / np.sqrt(3.0) * np.linalg.norm(areas)
+    assert wrench_calibration(test)[0] == pytest.approx(due, rel=1e-9)  # rounding: the actuator lies along x
+
+
+def test_a_reason_that_tests_share_is_the_same_for_all(monkeypatch):
+    def fails(test):
+        raise RecordError(f"{test.test.record.encoding['source']}: has no spool_position")
+
+    monkeypatch.setattr(phases, "_open_loop", fails)
+    reasons = set()
+    for name in ("TX", "TY"):
+        record = xr.Dataset()
+        record.encoding["source"] = f"campaign/{name}.nc"
+        test = SimpleNamespace(test=SimpleNamespace(record=record, name=name), time=np.zeros(2))
+        reasons.add(run_phase(2, test).reason)
+    assert reasons == {"has no spool_position"}

@@ -405,7 +405,7 @@ def test_the_command_writes_one_file_and_says_what_it_cannot_show(lhpost6, recor
         ([RECORD, "--machine", "hexapod"], "hexapod"),
         ([RECORD, *[RECORD] * 3], "at most 2"),
         ([RECORD, "--amplify", 0], "positive number"),
-        ([RECORD, "--machine", "uniaxial"], "columns"),
+        ([RECORD, "--machine", "uniaxial"], "name its machine"),
     ):
         assert refused(lhpost6("view", *wrong, "--export", tmp_path / "other.html"), why)
     assert not (tmp_path / "other.html").exists()

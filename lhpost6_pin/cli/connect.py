@@ -1,5 +1,7 @@
 """Commands that connect the virtual table to other programs: serve, link, export-fmu."""
 
+import logging
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -22,6 +24,8 @@ from .options import (
 )
 from .results_folder import RUN_FILES, folder_for
 
+log = logging.getLogger(__name__)
+
 __all__ = ["export_fmu", "link", "serve", "serve_specimen"]
 
 
@@ -35,7 +39,10 @@ def export_fmu(
     """Export the plant as an FMU (FMI 2.0, co-simulation) for Simulink, Modelica and other tools."""
     from ..interfaces.fmi import export_fmu as write_fmu
 
-    write_fmu(machine.load(valves), out)
+    table = machine.load(valves)
+    if out.exists():
+        log.warning("%s: an earlier FMU will be replaced; --out names another file", out)
+    write_fmu(table, out)
     print_result(json, dict, lambda: None, [out])
 
 
@@ -149,6 +156,7 @@ def link(
     with LinkClient(host, port) as client, progress_bar(f"{name} at {host}:{port}") as progress:
         done = run_over_link(client, plant, loop, progress=progress)
         counts = dict(client.close())
+    done = replace(done, holds=counts.get("holds", 0))
     counts |= {"resent": client.resent, "sensors_lost": client.sensors_lost, "ignored": client.ignored}
     counts["unanswered"] = int((~done.answered).sum())
     attrs = {"test": name, "title": f"{target.reference.title} over the link", "link_mode": client.mode.label}

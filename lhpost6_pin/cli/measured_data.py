@@ -50,13 +50,14 @@ def check(
         if not wrong:
             raise
         checked = None  # a record that breaks the layout is among the findings
-    written = []
+    written, unwritten = [], ""
     if sensors_out is not None:
         if checked is None or checked.content is None:
             why = "correct the errors first" if wrong else "no measured record of this machine"
-            raise RecordError(f"{sensors_out}: not written: {(checked.reason if checked else '') or why}")
-        save_sensors(checked.content, sensors_out)
-        written = [sensors_out]
+            unwritten = f"{sensors_out}: not written: {(checked.reason if checked else '') or why}"
+        else:
+            save_sensors(checked.content, sensors_out)
+            written = [sensors_out]
 
     summaries, skipped = (summarise_records(tests.records), tests.skipped) if tests else ((), ())
 
@@ -73,6 +74,8 @@ def check(
         return {**finding_entries(found), **summary, **check_entries(checked), "skipped": dict(skipped)}
 
     print_result(json, entries, show, written)
+    if unwritten:
+        raise RecordError(unwritten)
     if wrong:
         raise typer.Exit(1)
 

@@ -60,8 +60,8 @@ LIKELY_UNITS = {  # unit: least and greatest plausible peak, and the likely mist
 def check_record(path: Path | str, machine: Machine | None = None) -> list[RecordFinding]:
     """Contents and faults of the record at `path`; an unreadable file is one error.
 
-    With a `machine` forces are compared with its piston areas times the chamber pressures, and their signs with the
-    acceleration of its mass.
+    With a `machine` the record must be of it; its forces are compared with piston areas times the chamber pressures,
+    and their signs with the acceleration of its mass.
     """
     try:
         return check_dataset(open_record(path), machine)
@@ -71,7 +71,7 @@ def check_record(path: Path | str, machine: Machine | None = None) -> list[Recor
 
 def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[RecordFinding]:
     """List errors, then warnings, then the contents of a record in memory; see `check_record`."""
-    errors = layout_faults(dataset)
+    errors = layout_faults(dataset, None if machine is None else machine.labels)
     broken = {finding.channel.split("[")[0] for finding in errors}
     contents = [RecordFinding("info", *fact) for fact in _contents(dataset)]
     known = [name for name in LAYOUT if name in dataset and not {name, *LAYOUT[name].dims} & broken]
@@ -109,7 +109,7 @@ def _contents(dataset: xr.Dataset) -> Iterator[_Warning]:
     yield from (("", None, sentence, "") for sentence in changes_summary(dataset.attrs))
     for name, variable in dataset.data_vars.items():
         if variable.dtype.kind in "fiu" and variable.size and np.isfinite(variable).any():
-            yield from _extents(variable, "" if name in LAYOUT else ", not of the layout")
+            yield from _extents(variable, "" if name in LAYOUT else ", a further channel")
     for job in sorted({job for channel in LAYOUT.values() for job in channel.needed_by}):
         missing = [name for name, it in LAYOUT.items() if job in it.needed_by and not _given(dataset, name)]
         if missing:

@@ -6,8 +6,8 @@ known noise variance of X is subtracted from X'X, so that no gain is biased low.
 
 The tolerance of theta covers what calibration leaves uncertain: each such error is a signal E (one standard deviation)
 that y may contain, and moves theta by (X'X)^-1 X'E. It is three times the root sum of squares of these moves, or the
-sum of all at the ends of their ranges (sqrt(3) deviations), if that is more. The residual may contain E, and no less
-than the stated noise.
+sum of all at the ends of their ranges (sqrt(3) deviations), if that is more; a delay by that sum alone, as two delays
+within their ranges never add up to more. The residual may contain E, and no less than the stated noise.
 
 Where a force hardly varies, a gain and an offset are not separable. Coefficients that the records do not test are held
 at their nominal values, and the rest is solved again: the stated range of a held coefficient then widens the tolerance
@@ -46,10 +46,10 @@ MOST_NOISE = 0.1  # share of noise in a column, less the others, above which its
 class ConsistencyFinding:
     """One number by which two sensors (or a sensor and a law) were compared.
 
-    `tolerance` covers errors of calibration and geometry, at least three deviations; `standard_error` is that of the
-    noise. A gain or delay is "untested" where noise is too large: a standard error beyond the tolerance, or more than
-    a tenth of the regressor's power. `instead` are untested quantities that would have the same effect: where nothing
-    varies, an offset may be a gain.
+    `tolerance` covers errors of calibration and geometry, at least three deviations except for delays; `standard_error`
+    is that of the noise. A gain or delay is "untested" where noise is too large: a standard error beyond the tolerance,
+    or more than a tenth of the regressor's power. `instead` are untested quantities that would have the same effect:
+    where nothing varies, an offset may be a gain.
     """
 
     check: str
@@ -150,6 +150,7 @@ class _Solved(NamedTuple):
     inverse: Array  # (p, p) of X'X, zero where held
     error: Array  # (p,) standard errors
     lawful: Array  # (p,) tolerance for calibration errors
+    bound: Array  # (p,) that of errors which are all at the ends of their ranges
     doubt: Array  # (p,) tolerance for the uncertainty of the stated noise
     square: float  # mean square of the residual
     noise: float  # its part due to noise
@@ -167,11 +168,13 @@ def _solved(s: _Sums, kept: Mask, noise: Array, noise_range: float) -> _Solved:
     noise_left = (s.variance + float(theta**2 @ s.noise)) / s.samples
     left = s.ee - 2 * np.sum(moved * s.xe, axis=0) + np.einsum("pk,pq,qk->k", moved, s.xx, moved)
     spread = np.sqrt(max(square, noise_left) * s.samples / s.independent)
+    bound = np.sqrt(3.0) * np.sum(np.abs(moved), axis=1)
     return _Solved(
         theta,
         inverse,
         spread * np.sqrt(np.maximum(np.diag(inverse), 0.0)),
-        np.maximum(CONFIDENCE * np.sqrt(np.sum(moved**2, axis=1)), np.sqrt(3.0) * np.sum(np.abs(moved), axis=1)),
+        np.maximum(CONFIDENCE * np.sqrt(np.sum(moved**2, axis=1)), bound),
+        bound,
         ((1 + noise_range) ** 2 - 1) * np.abs(inverse @ (noise * theta)),
         square,
         noise_left,
@@ -195,6 +198,7 @@ def _findings(check: str, channel: str, s: _Sums, noise_range: float, late: floa
         if term.delay is not None:
             gain = by.theta[0] or 1.0
             value, sigma = late + term.delay - value / gain, sigma / abs(gain)
+            range_ = by.bound[i] + by.doubt[i]  # delays have limits, not deviations
         value, sigma, due, range_ = float(value), float(sigma), float(term.expected), float(range_)
         others = () if held[i] else tuple(s.terms[k].quantity for k in np.flatnonzero(held & (moved[i] > sigma)))
         verdict: Verdict = "untested" if held[i] else _verdict(abs(value - due), sigma, range_)

@@ -26,7 +26,7 @@ from ..machine.parameters import Parameters, Quantity, Value
 from ..mechanics.plant import Plant, make_plant
 from .alignment import group_delays
 from .channels import LAYOUT, MOTION, channel_unit, sensor_groups
-from .noise_levels import ChannelNoise, NoiseLevels, noise_levels
+from .noise_levels import CORNER, ChannelNoise, NoiseLevels, noise_levels
 from .records import is_measured
 from .rests import rest_numbers
 from .sensors import SensorSet, load_sensors, make_sensors, recorded_spectrum
@@ -49,20 +49,25 @@ class NoiseComparison(NamedTuple):
     channel: str
     unit: str
     measured: float  # standard deviation of white noise at the records' rate [unit]
-    stated: float  # nan where no file was given
+    stated: float  # nan where no file was given; of a band above the stated low-pass, that below it
     tolerance: float  # relative, stated range and three standard errors
     corner: float  # of the low-pass [Hz]; infinite where none shows
     step: float  # digital resolution [unit]
     uneven: float  # noisiest column over the median one, where all are alike
+    filtered: bool = False  # it was read where the stated low-pass leaves next to nothing, and cannot be compared
 
     @property
     def ratio(self) -> float:
-        """Measured over stated; infinite where none is stated, nan without a file."""
+        """Measured over stated; infinite where none is stated, nan without a file or where it is `filtered`."""
+        if self.filtered:
+            return np.nan
         return self.measured / self.stated if self.stated else np.inf
 
     @property
     def warning(self) -> str:
         """What is wrong with the statement, empty if it agrees."""
+        if self.filtered:
+            return ""
         size = f"noise of {self.measured:.2g} {self.unit}"
         if self.stated == 0.0:
             return f"{size}, where the sensors file states none"
@@ -111,7 +116,7 @@ def with_measured_noise(sensors: SensorSet, records: Sequence[xr.Dataset]) -> Se
     found, quantities = dict[str, float](), dict(sensors.parameters.quantities)
     for name, one in levels.channels.items():
         varies = one.density > 0
-        if one.density[varies].mean() < SHAKEN * one.quantum:
+        if one.density[varies].mean() < SHAKEN * one.quantum or _filtered(one, levels.rate, sensors):
             continue
         stated = float(_stated_density(one, levels.rate, sensors)[varies].mean())
         ratio = np.sqrt(one.density[varies].mean() / stated) if stated else 1.0
@@ -192,9 +197,10 @@ def _compared(one: ChannelNoise, rate: float, sensors: SensorSet | None) -> Nois
     six, varies = "axis" in LAYOUT[one.channel].dims, np.flatnonzero(one.density > 0)
     own = one.density[varies]
     measured, stated = (own if six else own.mean(keepdims=True)) + one.quantum, np.full(len(own), np.nan)
-    tolerance = 0.0
+    tolerance, filtered = 0.0, False
     if sensors is not None:
-        stated = _stated_density(one, rate, sensors)[varies]
+        filtered = _filtered(one, rate, sensors)
+        stated = (_plateau(one, rate, sensors) if filtered else _stated_density(one, rate, sensors))[varies]
         stated = np.where(stated > 0, stated + one.quantum, 0.0)
         tolerance = float(sensors.noise_range + 3 * one.error.max())
     stated = stated[: len(measured)]
@@ -203,13 +209,24 @@ def _compared(one: ChannelNoise, rate: float, sensors: SensorSet | None) -> Nois
     channel = f"{one.channel}[{AXES[varies[worst]]}]" if six else one.channel
     sd, due = (float(np.sqrt(x[worst] * rate / 2)) for x in (measured, stated))
     uneven = 1.0 if six else float(np.sqrt(own.max() / np.median(own)))
-    return NoiseComparison(channel, channel_unit(channel), sd, due, tolerance, one.corner, one.step, uneven)
+    return NoiseComparison(channel, channel_unit(channel), sd, due, tolerance, one.corner, one.step, uneven, filtered)
 
 
 def _stated_density(one: ChannelNoise, rate: float, sensors: SensorSet) -> Array:
     """Density (k,) of a channel's noise as a file states it, over the band in which it was measured [unit2/Hz]."""
     f = np.linspace(one.low, one.high, 33)
     return np.broadcast_to(recorded_spectrum(sensors, one.channel, f, rate).mean(axis=0), one.density.shape)
+
+
+def _plateau(one: ChannelNoise, rate: float, sensors: SensorSet) -> Array:
+    """Largest density (k,) of a channel's noise at any frequency of the records, as a file states it [unit2/Hz]."""
+    f = np.linspace(0.0, rate / 2, 129)
+    return np.broadcast_to(recorded_spectrum(sensors, one.channel, f, rate).max(axis=0), one.density.shape)
+
+
+def _filtered(one: ChannelNoise, rate: float, sensors: SensorSet) -> bool:
+    """Whether noise was read above the stated low-pass, as may be where no rest shows it below."""
+    return bool((_stated_density(one, rate, sensors) < CORNER * _plateau(one, rate, sensors)).any())
 
 
 # ------------------------------------------------------------------------------------------------ content

@@ -21,10 +21,11 @@ from .records import sample_interval
 from .rests import find_rests, rest_numbers, seconds_of
 from .signals import Band
 
-__all__ = ["ChannelNoise", "NoiseLevels", "noise_levels"]
+__all__ = ["CORNER", "ChannelNoise", "NoiseLevels", "noise_levels"]
 
 LEAST_OWN = 0.05  # of the resolution's variance: noise below it cannot be told from none, and is taken as this
 CORNER = 0.25  # of the power of the plateau: gain one half
+ROUND_OFF = 1e-20  # of the noisiest column's density: what varies by 1e-10 of that is computed, and no sensor's
 FIT = (0.05, 1e-3)  # relative power down to which the low-pass is fitted; least, for its logarithm
 
 
@@ -252,6 +253,7 @@ def _channel(
     f, mean, count = spectrum
     used = (f >= band[0]) & (f <= band[1])
     density = _level(mean[used], count)
+    density = np.where(density > ROUND_OFF * density.max(), density, 0.0)
     quantum = float(np.mean(pool.quantum))
     own = np.where(density > 0, np.maximum(density - quantum, LEAST_OWN * quantum), 0.0)
     # a mean of chi-squares, whose median has 1.25 times its deviation; half of that is of the root

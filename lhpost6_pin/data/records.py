@@ -6,8 +6,9 @@ others may be added; those present must be valid: `load_record` refuses any othe
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -21,6 +22,9 @@ from ..core.names import AXES
 from .channels import LAYOUT, LAYOUT_VERSION
 from .layout_faults import RecordFinding, is_number, layout_faults, sampling_rate
 
+if TYPE_CHECKING:
+    from ..machine.machine import Machine
+
 __all__ = [
     "FULL_SCALE",
     "DEFLATE_LIMIT",
@@ -29,6 +33,7 @@ __all__ = [
     "load_record",
     "make_record",
     "open_record",
+    "refuse_other_machine",
     "require",
     "sample_interval",
     "save_record",
@@ -41,6 +46,8 @@ DEFLATE_LIMIT = 5000  # no compressed netCDF unpacks to more than this (deflate 
 
 
 # ---------------------------------------------------------------------------------------------- disk
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
 FULL_SCALE = "full_scale_force"
 """Attribute of a record: force [N] at which an arrow of the viewer has its full length."""
 
@@ -51,8 +58,7 @@ def open_record(path: Path | str) -> xr.Dataset:
     The file stays as it is. Raises `RecordError`, naming the file, if it is missing, not netCDF-4, or damaged.
     """
     path = Path(path)
-    if not path.is_file():
-        raise RecordError(f"{path}: no such file")
+    _refuse_no_record(path)
     try:
         with h5py.File(path) as file:  # h5netcdf complains to the terminal of a file whose attributes are damaged
             _ = dict(file.attrs)
@@ -68,6 +74,20 @@ def open_record(path: Path | str) -> xr.Dataset:
         raise RecordError(
             f"{path}: not a netCDF-4 (HDF5) file, or damaged: {error}; make or export the record again"
         ) from error
+
+
+def _refuse_no_record(path: Path) -> None:
+    """Raise `RecordError` for a directory, a missing file, and one without the first bytes of HDF5."""
+    imported = "`lhpost6 import` makes records of measured data (CSV, .mat, ...)"
+    if path.is_dir():
+        within = sorted(path.glob("*.nc"))
+        what = f"; name one record of it, such as {within[0]}" if within else f" without records (.nc); {imported}"
+        raise RecordError(f"{path}: is a directory{what}")
+    if not path.is_file():
+        raise RecordError(f"{path}: no such file")
+    with suppress(OSError), path.open("rb") as file:  # what cannot be read is an error of opening it
+        if file.read(len(_HDF5)) != _HDF5:
+            raise RecordError(f"{path}: not a netCDF-4 (HDF5) file; {imported}")
 
 
 def _brought_up(dataset: xr.Dataset) -> xr.Dataset:
@@ -173,6 +193,17 @@ def require(dataset: xr.Dataset, *names: str) -> None:
     if missing:
         file = dataset.encoding.get("source", "the record")
         raise RecordError(f"{file}: has no {', '.join(missing)}; it has {', '.join(map(str, dataset.data_vars))}")
+
+
+def refuse_other_machine(machine: "Machine", dataset: xr.Dataset) -> None:
+    """Raise `RecordError` for a record whose components are not those of a machine."""
+    for dim, names in machine.labels.items():
+        if dim in dataset.coords and [str(x) for x in dataset[dim].values] != list(names):
+            raise RecordError(
+                f"{dataset.encoding.get('source', 'the record')}: has {dim}s "
+                f"{' '.join(map(str, dataset[dim].values))}, {machine.name} has {' '.join(names)}; name its machine "
+                "with --machine"
+            )
 
 
 def _refuse(faults: Sequence[RecordFinding], source: str) -> None:

@@ -80,6 +80,10 @@ class SensorSet:
         """Standard deviation of the delay of a group of `channels.sensor_groups` [s]."""
         return self.delay_range.get(group, 0.0) / np.sqrt(3.0)
 
+    def relative_delay_range(self, group: str, reference: str) -> float:
+        """Largest delay of one group behind another [s], as each may be off by its range."""
+        return self.delay_range.get(group, 0.0) + self.delay_range.get(reference, 0.0)
+
 
 def load_sensors(name_or_path: str | Path = "lhpost6") -> SensorSet:
     """Read a file of sensors by shipped name or by path.

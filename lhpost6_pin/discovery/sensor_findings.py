@@ -20,8 +20,15 @@ from ..mechanics.plant import Plant
 
 __all__ = ["SensorFault", "correct_records", "find_sensor_faults"]
 
-_CHECKS = ("velocity against displacement", "acceleration against displacement", "length against platen pose")
-_SKEWED = (*_CHECKS, "force against pressures")
+_SKEWED = {
+    "velocity against displacement": "platen_displacement",
+    "acceleration against displacement": "platen_displacement",
+    "length against platen pose": "platen_displacement",
+    "force against pressures": "chamber_pressure",
+}
+"""Group of channels that each check compares delays with."""
+
+_CHECKS = tuple(check for check in _SKEWED if check != "force against pressures")
 
 
 @dataclass(frozen=True)
@@ -34,7 +41,8 @@ class SensorFault:
     value: float
     unit: str
     deviation: float  # standard, of noise and calibration uncertainty
-    stated: float  # largest error that the sensors' file allows
+    stated: float  # largest error that the sensors' file allows; of a delay, of both groups together
+    reference: str = ""  # group of channels that a delay is relative to
 
     @property
     def name(self) -> str:
@@ -86,14 +94,14 @@ def _fault(finding: ConsistencyFinding, sensors: SensorSet) -> SensorFault | Non
 def _late(findings: Sequence[ConsistencyFinding], sensors: SensorSet) -> list[SensorFault]:
     """Groups of channels of which most testable columns are delayed."""
     faults = []
-    for check in _SKEWED:
+    for check, reference in _SKEWED.items():
         tested = [f for f in findings if f.check == check and f.quantity == "delay" and f.verdict != "untested"]
         off = [f for f in tested if f.verdict == "suspicious"]
         if 2 * len(off) > len(tested):
             group = tested[0].channel.partition("[")[0]  # the same for all
             middle = sorted(off, key=lambda f: f.estimate)[len(off) // 2]
-            error, stated = middle.estimate - middle.expected, sensors.delay_range.get(group, 0.0)
-            faults.append(SensorFault("delay", group, "", error, "s", middle.deviation, stated))
+            error, stated = middle.estimate - middle.expected, sensors.relative_delay_range(group, reference)
+            faults.append(SensorFault("delay", group, "", error, "s", middle.deviation, stated, reference))
     return faults
 
 

@@ -37,7 +37,8 @@ class SensorFinding:
     name: str
     family: str
     estimate: Estimate
-    stated: float  # largest error that the sensors' file allows
+    stated: float  # largest error that the sensors' file allows; of a delay, of both groups together
+    reference: str = ""  # group of channels that a delay is relative to
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def judge(
     sensors = (*(_of_fault(f, reach) for f in faults), *released)
     known = {one.name for one in sensors}
     late = [d for d in problem.delays if d.beyond(calibration.number("report.deviations"))]
-    behind = (SensorFault("delay", d.group, "", d.delay, "s", d.deviation, d.stated) for d in late)
+    behind = (SensorFault("delay", d.group, "", d.delay, "s", d.deviation, d.stated, d.reference) for d in late)
     removed = tuple(_of_fault(f, reach) for f in behind if f.name not in known)  # no part of the verdict's word
     rescaled = _rescaled(found)
     gone = {one.name for one in withdrawn}
@@ -185,7 +186,8 @@ def _behind(added: AddedEffect) -> dict[str, float]:
 
 def _of_fault(fault: SensorFault, reach: float) -> SensorFinding:
     low, high = (fault.value + side * reach * fault.deviation for side in (-1.0, 1.0))
-    return SensorFinding(fault.name, fault.family, Estimate(fault.value, fault.unit, low, high), fault.stated)
+    estimate = Estimate(fault.value, fault.unit, low, high)
+    return SensorFinding(fault.name, fault.family, estimate, fault.stated, fault.reference)
 
 
 def _merged(effects: Sequence[EffectFinding]) -> tuple[EffectFinding, ...]:

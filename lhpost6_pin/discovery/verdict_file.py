@@ -79,7 +79,13 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "sums": [{"of": list(names), **_interval(total)} for names, total in verdict.sums.items()],
         "scale": _scale(found),
         "sensor_findings": [
-            {"name": s.name, "family": s.family, **_interval(s.estimate), "stated_range": s.stated}
+            {
+                "name": s.name,
+                "family": s.family,
+                **_interval(s.estimate),
+                "stated_range": s.stated,
+                "relative_to": s.reference,
+            }
             for s in verdict.sensors
         ],
         "closure": closure,
@@ -247,7 +253,7 @@ def _beyond(sensors: Sequence[SensorFinding]) -> str:
         value, stated, unit = one.estimate.value, one.stated, one.estimate.unit
         if unit == "s":
             value, stated, unit = 1e3 * value, 1e3 * stated, "ms"
-        size = f"{value:.3g}{'' if unit == '1' else f' {unit}'}"
+        size = f"{value:.3g}{'' if unit == '1' else f' {unit}'}" + f" relative to {one.reference}" * bool(one.reference)
         each.append(one.name if one.name.startswith("sign ") else f"{one.name} {size} (at most {stated:.3g})")
     return f"sensors beyond the ranges of the sensors file: {', '.join(each)}"
 

@@ -24,7 +24,7 @@ from ..core.errors import RecordError
 from ..data.alignment import Delay, align_record, group_delays, oil_force
 from ..data.channels import LAYOUT, MOTION, channel_name
 from ..data.fusion import fuse_motion
-from ..data.records import is_measured, require, sample_interval
+from ..data.records import is_measured, refuse_other_machine, require, sample_interval
 from ..data.sensors import SensorSet
 from ..data.signals import Band, differentiate
 from ..data.valve_pairs import with_joint_spools
@@ -134,12 +134,7 @@ def check_usable(machine: Machine, record: xr.Dataset) -> None:
     """Refuse a record of another machine, with a specimen that this one does not carry, or with holes."""
     require(record, "time")
     machine.refuse_unmounted(record.attrs, "the record")
-    for dim, names in machine.labels.items():
-        if dim in record.coords and [str(x) for x in record[dim].values] != list(names):
-            raise RecordError(
-                f"{source_of(record)}: has {dim}s {' '.join(map(str, record[dim].values))}, {machine.name} has "
-                f"{' '.join(names)}; name its machine with --machine"
-            )
+    refuse_other_machine(machine, record)
     for name in (name for name in LAYOUT if name in record):
         bad = np.argwhere(~np.isfinite(record[name].values))
         if bad.size:

@@ -36,7 +36,10 @@ def range_summary(calibration: Calibration) -> str:
 def delay_summary(calibration: Calibration) -> str:
     """Delays beyond their stated ranges that were removed before the fit; empty if there are none."""
     late = [d for d in calibration.delays if d.beyond(calibration.limit)]
-    each = [f"{d.group} {1e3 * d.delay:.3g} ms (stated: at most {1e3 * d.stated:.3g} ms)" for d in late]
+    each = [
+        f"{d.group} {1e3 * d.delay:.3g} ms relative to {d.reference} (stated of both: at most {1e3 * d.stated:.3g} ms)"
+        for d in late
+    ]
     return f"Delays beyond their stated ranges, removed before the fit: {', '.join(each)}." if late else ""
 
 

@@ -19,7 +19,7 @@ from ...mechanics.pose import plant_motion
 from ...simulation.specimen_response import driven_wrenches
 from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, prepare_test
 from .problem import KINDS, Problem, ResidualBands
-from .sensor_errors import RemovedDelay
+from .sensor_errors import removed_delays
 from .usable_tests import too_short
 
 __all__ = ["as_simulated", "policy_of", "prepare_problem"]
@@ -62,10 +62,7 @@ def prepare_problem(
     plant = make_plant(machine)
     policy = policy_of(numbers)
     records, delays = align_records(plant, records, policy)
-    removed = tuple(
-        RemovedDelay(group, late.delay, late.standard_error, sensors.delay_range.get(group, 0.0))
-        for group, late in delays.items()
-    )
+    removed = removed_delays(delays, sensors)
     rng = np.random.default_rng(seed)
 
     def prepared(record: xr.Dataset, policy: Policy) -> MeasuredTest:

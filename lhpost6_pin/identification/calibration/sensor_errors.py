@@ -21,6 +21,7 @@ import xarray as xr
 
 from ...core.arrays import Array
 from ...core.names import AXES
+from ...data.alignment import Delay
 from ...data.channels import LAYOUT, Channel, channel_unit, residuals_of, sensor_groups
 from ...data.records import sample_interval
 from ...data.sensors import SensorSet
@@ -30,7 +31,8 @@ from ...mechanics.pose import PlatenMotion
 from ..prepare import MeasuredTest
 from .scale import measures_alone
 
-__all__ = ["RemovedDelay", "SensorUnknown", "corrected", "corrected_record", "sensor_unknowns"]
+__all__ = ["RemovedDelay", "SensorUnknown", "corrected", "corrected_record", "removed_delays"]
+__all__ += ["sensor_unknowns"]
 
 
 @dataclass(frozen=True)
@@ -56,11 +58,20 @@ class RemovedDelay(NamedTuple):
     group: str
     delay: float  # [s]
     deviation: float  # standard [s]
-    stated: float  # largest delay that the sensors' file allows [s]
+    stated: float  # largest delay behind the reference that the sensors' file allows [s]: the sum of both ranges
+    reference: str  # group of channels that it is relative to
 
     def beyond(self, reach: float) -> bool:
         """Whether it is beyond the stated one by more than `reach` standard deviations."""
         return abs(self.delay) > self.stated + reach * self.deviation
+
+
+def removed_delays(delays: Mapping[str, Delay], sensors: SensorSet) -> tuple[RemovedDelay, ...]:
+    """Delays by group that were removed, each with the largest one that the sensors' file allows."""
+    return tuple(
+        RemovedDelay(*(group, d.delay, d.standard_error, sensors.relative_delay_range(group, d.reference), d.reference))
+        for group, d in delays.items()
+    )
 
 
 def sensor_unknowns(machine: Machine, sensors: SensorSet, test: MeasuredTest) -> tuple[SensorUnknown, ...]:

@@ -117,10 +117,10 @@ def decompose_record(
     high = numbers.number("comparison.cutoff") if cutoff is None else cutoff
     if not high > 0.0:
         raise RecordError(f"the cutoff must be above zero (got {high:g} Hz)")
-    if 1.0 / dt <= high:
+    if 0.5 / dt <= high:
         raise RecordError(
-            f"{source_of(record)}: {1.0 / dt:g} samples per second are too few to compare forces up "
-            f"to {high:g} Hz; lower the cutoff"
+            f"{source_of(record)}: {1.0 / dt:g} samples per second show nothing above {0.5 / dt:g} Hz, too few to "
+            f"compare forces up to {high:g} Hz; give a cutoff below {0.5 / dt:g} Hz (--cutoff)"
         )
     band = Band(high=high, order=int(numbers.number("comparison.order")))
     comparison = ComparisonBand(band, numbers.number("comparison.edge"))

@@ -27,6 +27,7 @@ from ...simulation.rehearse import rehearse, replay
 from ...simulation.simulate import fastest_engine
 from ...tuning.drives import load_drive
 from ..decompose.record import decompose_test
+from ..prepare import source_of
 from .phase_agreement import ColumnAgreement, ComparedQuantity, agree
 from .prepare_tests import PreparedTest, wrench_calibration
 from .simulated_phases import Lag, SimulatedComparison
@@ -75,7 +76,8 @@ def run_phase(number: int, test: PreparedTest) -> Phase:
     try:
         return phases[number](test)
     except LhpostError as error:
-        return Phase(number, test.test.name, test.time, reason=str(error))
+        why = str(error).removeprefix(f"{source_of(test.test.record)}: ")  # alike for all tests
+        return Phase(number, test.test.name, test.time, reason=why)
 
 
 def _inverse_dynamics(test: PreparedTest) -> Phase:

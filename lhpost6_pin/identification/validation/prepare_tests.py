@@ -101,12 +101,28 @@ def total_wrench(plant: Plant, motion: PlatenMotion, force: Array) -> Array:
 
 
 def wrench_calibration(test: PreparedTest) -> Array:
-    """Standard deviation (6,) of the measured wrench's mean at C by gains and offsets of force sensors; nan without."""
-    sensors, force = test.basis.sensors, test.test.channels.get("actuator_force")
-    if force is None:
+    """Standard deviation (6,) of the measured wrench's mean at C by gains and offsets of the sensors of force.
+
+    These are load cells, or the pressures that forces come from where none were recorded; nan without either.
+    """
+    sensors, actuators = test.basis.sensors, test.plant.machine.actuators
+    double = np.array([a.area_b is not None for a in actuators])
+    area_a = np.array([a.area_a for a in actuators])
+    area_b = np.array([a.area_b for a in actuators if a.area_b is not None])
+    every = np.ones(len(actuators), bool)
+    ways = (
+        {"actuator_force": (every, np.ones(len(actuators)))},
+        {"chamber_pressure_a": (every, area_a), "chamber_pressure_b": (double, area_b)},
+        {"pressure_difference": (double, area_a[double])},
+    )
+    way = next((way for way in ways if next(iter(way)) in test.test.channels), None)
+    if way is None:
         return np.full(6, np.nan)
-    mean = force.mean(axis=0)
-    sd = np.hypot(sensors.offset_sd("actuator_force"), sensors.gain_sd("actuator_force") * mean)
+    variance = np.zeros(len(actuators))
+    for name, (of, area) in way.items():
+        if name in test.test.channels:
+            mean = test.test.channels[name].mean(axis=0)
+            variance[of] += area**2 * (sensors.offset_sd(name) ** 2 + (sensors.gain_sd(name) * mean) ** 2)
     rest = plant_motion(test.plant, PlatenMotion(*np.zeros((3, 1, 6))))
-    arms = leg_wrenches(test.plant, rest.q, np.ones((1, len(mean))))[0]
-    return np.asarray(np.sqrt((arms**2).T @ sd**2))
+    arms = leg_wrenches(test.plant, rest.q, np.ones((1, len(actuators))))[0]
+    return np.asarray(np.sqrt((arms**2).T @ variance))

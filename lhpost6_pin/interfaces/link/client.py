@@ -215,6 +215,12 @@ class LinkClient:
                 yield frame
 
     def _silence(self) -> str:
+        reading: Reading | None = getattr(self, "reading", None)  # none before the server has answered once
+        if reading is not None and reading.sample:
+            return (
+                f"{self._where} answered up to sample {reading.sample} and was silent for "
+                f"{self._timeout * self._tries:g} s after it; the server has ended, or the network fails"
+            )
         return (
             f"{self._where} did not answer within {self._timeout * self._tries:g} s; start the plant there with "
             "`lhpost6 serve` of this version, or wait until another client has left it"

@@ -32,6 +32,7 @@ from .served import MISSED_FRAMES
 __all__ = ["LinkRun", "record_of_link_run", "run_over_link"]
 
 _CHUNK = 1024  # samples between two progress reports
+_LEAST = 2  # samples of a record
 _MICROMETRE = 1e-6  # [m] more than rounding, less than any pose but the zero-position
 
 
@@ -51,10 +52,14 @@ class LinkRun:
     answered: NDArray[np.bool_]
     tripped: bool
     seconds: float  # from the first command to the last sensors [s]
+    lost: str = ""  # how the server fell silent, if it did
+    holds: int = 0  # safe holds that the server counted, some too short for the controller to see
 
     @property
     def trouble(self) -> str | None:
-        """Why the motion is not the controller's: the plant tripped, or went to its safe hold. None where it is."""
+        """Why the motion is not the controller's: no server, the plant tripped, or a safe hold. None where it is."""
+        if self.lost:
+            return f"lost the server at {len(self.answered) / SAMPLE_RATE:.4f} s: {self.lost}"
         if self.tripped:
             at = f"stopped at {len(self.answered) / SAMPLE_RATE:.4f} s: the plant tripped"
             return f"{at}; an actuator reached the end of its stroke, or the run diverged: see the server"
@@ -63,6 +68,7 @@ class LinkRun:
         count = int(np.count_nonzero(np.diff(held, prepend=False) & held))
         if not count:
             return None
+        count = max(count, self.holds)
         holds, first = f"{count} safe hold{'s'[: count != 1]}", float(held.argmax()) / SAMPLE_RATE
         return (
             f"lost its commands: {holds}, the first at {first:.4f} s; the motion is not the controller's: take "
@@ -75,9 +81,9 @@ def run_over_link(
 ) -> LinkRun:
     """Drive the served plant through a motion; `plant` is the controller's model of it.
 
-    Each sample's command answers the newest sensors, with the drive of their sample. Ends early if the plant trips.
-    Raises SimulationError for an impossible drive, LinkError if the plant is no longer at rest, differs from the
-    server's, or the server does not answer.
+    Each sample's command answers the newest sensors, with the drive of their sample. Ends early if the plant trips, or
+    the server falls silent. Raises SimulationError for an impossible drive, LinkError if the plant is no longer at
+    rest, differs from the server's, or the server does not answer from the start.
     """
     _check(client, plant)
     samples = len(loop.drive if isinstance(loop, ClosedLoop) else loop.displacement)
@@ -87,7 +93,7 @@ def run_over_link(
     rows |= {"acceleration": np.zeros((samples, 6)), "state": np.zeros(samples, np.int8)}
     answered = np.zeros(samples, np.bool_)
     moved = [client.reading.motion] * samples
-    reading, reported, begin = client.reading, 0, 0
+    reading, reported, begin, lost = client.reading, 0, 0, ""
     with undisturbed() if client.mode != LinkMode.LOCK_STEP else nullcontext():
         while reading.sample < samples and reading.state != PlantState.TRIPPED:
             at, sensors = reading.sample, reading.sensors
@@ -96,7 +102,13 @@ def run_over_link(
             moved[at] = reading.motion
             rows["force"][at], rows["state"][at], answered[at] = sensors.force, reading.state, True
             begin = begin or now()
-            reading = client.exchange(command)
+            try:
+                reading = client.exchange(command)
+            except LinkError as error:
+                if answered.sum() < _LEAST:
+                    raise
+                lost = str(error)
+                break
             if progress is not None and at >= reported:
                 progress(at / samples)
                 reported = at + _CHUNK
@@ -106,7 +118,7 @@ def run_over_link(
     tripped = reading.state == PlantState.TRIPPED
     kept: dict[str, Any] = {name: row[last] for name, row in rows.items()}
     motion = [moved[at] for at in last]
-    return LinkRun(**kept, motion=motion, answered=answered[:done], tripped=tripped, seconds=seconds)
+    return LinkRun(**kept, motion=motion, answered=answered[:done], tripped=tripped, seconds=seconds, lost=lost)
 
 
 def record_of_link_run(

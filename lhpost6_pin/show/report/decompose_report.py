@@ -101,7 +101,7 @@ def _headlines(found: Decomposed, agreement: WrenchAgreement) -> list[Headline]:
     for match, what in ((agreement.actuators, "total actuator force"), (agreement.dissipative, "dissipative force")):
         worst = max(moved, key=lambda k: float(match.rrmse_varying[k]))
         note = f"{AXES[worst]}; {percent(float(match.rrmse[worst]))} including the mean"
-        label = f"Worst RRMSE of the {what}, mean removed"
+        label = f"Worst RRMSE of the {what} on axes that move, mean removed"
         tiles.append(Headline(percent(float(match.rrmse_varying[worst])), label, note))
     if found.sensors is not None:
         ratio = agreement.noise_ratio

@@ -115,7 +115,15 @@ def _balance_table(balances: Sequence[Balance]) -> Table:
 
 
 def _sensor_table(sensors: Sequence[SensorFinding]) -> Table:
-    rows = [(s.name, f"{s.estimate.value:.4g} {s.estimate.unit}", f"{s.stated:.3g}", s.family) for s in sensors]
+    rows = [
+        (
+            s.name,
+            f"{s.estimate.value:.4g} {s.estimate.unit}" + f" relative to {s.reference}" * bool(s.reference),
+            f"{s.stated:.3g}",
+            s.family,
+        )
+        for s in sensors
+    ]
     return Table("Sensors beyond the ranges of the sensors file", ("Error", "Value", "At most", "Family"), rows)
 
 

@@ -5,9 +5,9 @@ import numpy as np
 from ...core.arrays import Array
 from ...identification.decompose.interface import InterfacePeak, InterfaceWrench
 from ...mechanics.interface_wrench import INTERFACE_AXES
-from .page import Block, Headline, Table, number
+from .page import Block, Headline, Table
 from .plots import BLACK, BLUE, ORANGE, SKY, VERMILLION, Row, Trace, time_figure
-from .scales import Scale, shown_as
+from .scales import Scale, scaled_number, shown_as
 from .specimen_section import FORCE, INTERFACE_NAMES, MOMENT
 
 __all__ = ["interface_blocks", "interface_headlines", "interface_sentence", "interface_table"]
@@ -34,14 +34,14 @@ def interface_table(found: InterfaceWrench) -> Table:
     rows = []
     for peak in found.peaks:
         scale = _scale(peak.component)
-        shown = [INTERFACE_NAMES[peak.component], scale.unit, number(peak.value * scale.factor)]
-        shown += [f"± {number(peak.half_width * scale.factor)}"] * bool(known)
+        shown = [INTERFACE_NAMES[peak.component], scale.unit, scaled_number(peak.value, scale)]
+        shown += [f"± {scaled_number(peak.half_width, scale)}"] * bool(known)
         shown += [f"{peak.time:.3f} s"]
-        shown += [number(peak.predicted * scale.factor)] * (found.predicted is not None)
+        shown += [scaled_number(peak.predicted, scale)] * (found.predicted is not None)
         for values in (found.floors, found.simulated):
             if values is not None:
                 column = values[:, INTERFACE_AXES.index(peak.component)]
-                shown.append(number(float(column[np.argmax(np.abs(column))]) * scale.factor))
+                shown.append(scaled_number(float(column[np.argmax(np.abs(column))]), scale))
         rows.append(shown)
     header = ["Component", "Unit", "Peak", *[f"{_share(found)} interval"] * bool(known), "Time"]
     header += ["Mounted model"] * (found.predicted is not None) + ["Floors"] * (found.floors is not None)
@@ -94,8 +94,8 @@ def interface_sentence(found: InterfaceWrench) -> str:
 
     def said(peak: InterfacePeak) -> str:
         scale = _scale(peak.component)
-        width = f" ± {number(peak.half_width * scale.factor)}" if found.sd.any() else ""
-        return f"{INTERFACE_NAMES[peak.component]} {number(abs(peak.value) * scale.factor)}{width} {scale.unit}"
+        width = f" ± {scaled_number(peak.half_width, scale)}" if found.sd.any() else ""
+        return f"{INTERFACE_NAMES[peak.component]} {scaled_number(abs(peak.value), scale)}{width} {scale.unit}"
 
     return f"Peaks at the interface of the specimen: {', '.join(said(peak) for peak in found.peaks[:5])}."
 
@@ -110,7 +110,7 @@ def _sources(found: InterfaceWrench) -> list[Block]:
     rms = [np.sqrt(np.mean(np.broadcast_to(x, found.wrench.shape) ** 2, axis=0)) for x in
            (found.noise, found.sensors, found.parameters, found.sd)]  # fmt: skip
     rows = [
-        (INTERFACE_NAMES[name], _scale(name).unit, *(number(float(x[j]) * _scale(name).factor) for x in rms))
+        (INTERFACE_NAMES[name], _scale(name).unit, *(scaled_number(float(x[j]), _scale(name)) for x in rms))
         for j, name in enumerate(INTERFACE_AXES)
     ]
     header = ("Component", "Unit", "Noise", "Sensors' calibration", "Bare table's parameters", "All")

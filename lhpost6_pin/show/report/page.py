@@ -124,6 +124,11 @@ def text(value: object) -> Markup:
     return value if isinstance(value, Markup) else Markup(html.escape(str(value)))
 
 
+def prose(value: object) -> Markup:
+    """As `text`, what stands between backticks as code."""
+    return value if isinstance(value, Markup) else Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", text(value)))
+
+
 def number(value: float, digits: int = 3) -> str:
     """`value` with `digits` significant digits for reading; an en dash where it is not finite."""
     if not math.isfinite(value):
@@ -153,7 +158,7 @@ def markup(block: Block) -> Markup:
 
 def paragraph(*parts: object) -> Markup:
     """Return one paragraph."""
-    return Markup(f"<p>{''.join(map(text, parts))}</p>")
+    return Markup(f"<p>{''.join(map(prose, parts))}</p>")
 
 
 def missing(names: Sequence[str], consequence: str) -> Markup:
@@ -164,7 +169,7 @@ def missing(names: Sequence[str], consequence: str) -> Markup:
 
 def bullet_list(items: Iterable[object]) -> Markup:
     """Return an unordered list."""
-    return Markup("<ul>" + "".join(f"<li>{text(item)}</li>" for item in items) + "</ul>")
+    return Markup("<ul>" + "".join(f"<li>{prose(item)}</li>" for item in items) + "</ul>")
 
 
 def details(summary: str, *blocks: Block) -> Markup:
@@ -313,7 +318,7 @@ def _summary(page: Page) -> str:
         f'<header><p class="kind">{text(page.kind)}</p><h1>{text(page.title)}</h1>'
         f'<p class="purpose">{text(page.purpose)}</p>'
         f'<p class="verdict {page.level}"><span class="sign" aria-hidden="true">{SIGNS[page.level]}</span>'
-        f'<span>{text(page.verdict)}</span></p><dl class="tiles">{tiles}</dl>{notes}</header>'
+        f'<span>{prose(page.verdict)}</span></p><dl class="tiles">{tiles}</dl>{notes}</header>'
         "<noscript><p class='missing'>Plots need JavaScript; the numbers are also in tables.</p></noscript>"
         "<p class='missing' id='no-plots' hidden></p>"
     )

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from ...motions import Peak
 from ...simulation.limit_use import TOLERANCE, LimitUse, governing_limits
-from .page import Block, Table, bar
+from .page import Block, Table, bar, number
 from .scales import SCALES, axis_scale, shown_as
 
 __all__ = ["demand_table", "limit_blocks", "limit_table"]
@@ -48,6 +48,6 @@ def limit_table(uses: Sequence[LimitUse]) -> Table:
     rows = []
     for use in governing_limits(uses):
         scale = SCALES[SHOWN[use.quantity]] if use.quantity in SHOWN else axis_scale(use.name, use.quantity)
-        peak = "–" if use.quantity == "spool" else shown_as(use.peak, scale)
+        peak = f"{number(use.peak, 3)} of the stroke" if use.quantity == "spool" else shown_as(use.peak, scale)
         rows.append((use.quantity.capitalize(), use.name, peak, bar(use.share, TOLERANCE)))
     return Table("Demand over capacity", ("Limit", "Governing", "Peak", "Demand / capacity"), rows)

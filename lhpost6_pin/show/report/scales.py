@@ -19,12 +19,17 @@ __all__ = [
     "late_or_ahead",
     "milliseconds",
     "percent",
+    "scaled_number",
     "shown_as",
     "signed",
 ]
 
 DIRECTIONS = {"x": "longitudinal", "y": "transverse", "z": "vertical"}
 ROTATIONS = ("roll", "pitch", "yaw")
+
+
+ROUND_OFF = 1e-11
+"""In the unit shown: what is smaller is round-off of a sum that should be zero, and shown as 0."""
 
 
 @dataclass(frozen=True)
@@ -68,12 +73,21 @@ def axis_title(axis: str) -> str:
 
 def percent(fraction: float) -> str:
     """Return a share in per cent; an en dash where it is not finite."""
-    return f"{number(100 * fraction)}\N{NO-BREAK SPACE}%" if np.isfinite(fraction) else "–"
+    return f"{_visible(100 * fraction)}\N{NO-BREAK SPACE}%" if np.isfinite(fraction) else "–"
 
 
 def shown_as(value: float, scale: Scale) -> str:
     """Return an SI value in the unit it is shown in."""
-    return f"{number(value * scale.factor)}\N{NO-BREAK SPACE}{scale.unit}"
+    return f"{scaled_number(value, scale)}\N{NO-BREAK SPACE}{scale.unit}"
+
+
+def scaled_number(value: float, scale: Scale) -> str:
+    """Return an SI value as a number in the unit it is shown in."""
+    return _visible(value * scale.factor)
+
+
+def _visible(value: float) -> str:
+    return number(0.0 if abs(value) < ROUND_OFF else value)
 
 
 def milliseconds(seconds: float) -> str:

@@ -116,8 +116,8 @@ def _residual_blocks(found: Validation) -> list[Block]:
         "sensors add to the residual of moving axes.",
         Table("Residual of inverse dynamics over the noise predicted", ("Test", *columns), ratios),
         "Mean of required less measured force by inverse dynamics. The last row is its uncertainty from gains and "
-        f"offsets of the force sensors, one standard deviation; ! marks more than {SENSED:g} of them: a weight, a "
-        "pressure or a sensor is wrong.",
+        "offsets of the sensors of force (load cells, else pressures), one standard deviation; ! marks more than "
+        f"{SENSED:g} of them: a weight, a pressure or a sensor is wrong.",
         Table("Mean error of the total actuator force", ("Test", *units), means),
     ]
 

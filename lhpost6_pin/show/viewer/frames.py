@@ -10,7 +10,7 @@ import xarray as xr
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError, RecordError
-from ...data.records import FULL_SCALE, require
+from ...data.records import FULL_SCALE, refuse_other_machine, require
 from ...machine.machine import Machine
 from ...mechanics.plant import make_plant
 from ...mechanics.pose import forward_kinematics
@@ -110,8 +110,10 @@ def record_frames(
     """Frames of a record, with its reference and other records over it, two at most.
 
     A record without platen displacement is drawn from its actuator displacements. Raises RecordError if it has neither,
-    or if the records share no time; else as `make_frames`.
+    if a record is of another machine, or if the records share no time; else as `make_frames`.
     """
+    for one in (record, *others):
+        refuse_other_machine(machine, one)
     time, ghosts = record["time"].values, []
     if "reference_displacement" in record:
         ghosts.append(Ghost("reference", "reference", time, record["reference_displacement"].values))

@@ -18,12 +18,13 @@ from .discover import Discovery
 from .estimates import Estimate
 from .finding import EffectFinding
 from .floor import NOISE
+from .held_out import Gap
 from .search_state import Round
 from .unexplained import forces_explained
 from .verdict import SensorFinding
 from .withdrawal import Why
 
-__all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "where"]
+__all__ = ["advice", "open_share", "save_verdict", "summary", "title_of", "verdict_entries", "where"]
 
 
 _WITHDRAWN: dict[Why, str] = {
@@ -39,6 +40,9 @@ CONSIDERED = 1.0
 
 REMAINS = 0.01
 """Share of the squares beyond noise from which what remains is stated."""
+
+OPEN = 0.1
+"""Share of a gap beyond its floor from which it is stated that the effects leave it."""
 
 WORSE = 1.05
 """Normalised RMS error on a held-out test over that before, from which it counts as worse."""
@@ -204,6 +208,7 @@ def summary(found: Discovery) -> str:
     if verdict.word in ("named", "ambiguous"):
         left = [f"{100.0 * share:.2g} % ({kind})" for kind, share in verdict.remainder.items() if share > REMAINS]
         text += f" Of the squares beyond noise remain {', '.join(left)}." if left else ""
+        text += _open_summary(found)
     identified = {one.family for one in verdict.effects}
     for why, reason in _WITHDRAWN.items():
         gone = dict.fromkeys(one.family for one in verdict.withdrawn if one.why == why)
@@ -225,6 +230,26 @@ def summary(found: Discovery) -> str:
     if verdict.effects and found.proof is None:
         return f"{text} Not validated, as no test was held out: add tests, or name one with --hold-out."
     return text
+
+
+def open_share(found: Discovery) -> float:
+    """Largest share of a held-out gap beyond its floor that the effects leave; zero where no gap was open."""
+    return max((1.0 - gap.closure for gap in _open_gaps(found)), default=0.0)
+
+
+def _open_gaps(found: Discovery) -> list[Gap]:
+    """The gaps of held-out tests that were open before the effects."""
+    return [gap for gap in found.proof.gaps if not math.isnan(gap.closure)] if found.proof else []
+
+
+def _open_summary(found: Discovery) -> str:
+    """How much of the widest gap the effects leave; empty where that is little."""
+    if open_share(found) <= OPEN:
+        return ""
+    gap = min(_open_gaps(found), key=lambda one: one.closure)
+    sizes = f"normalised RMS error {gap.refitted:.3g} to {gap.after:.3g}, floor {gap.floor:.3g}"
+    left = f"{100.0 * (1.0 - gap.closure):.0f} % of the error beyond the floor remains"
+    return f" On held-out tests {left} ({gap.phase}, {gap.test}: {sizes})."
 
 
 def _name_of(one: EffectFinding) -> str:

@@ -11,7 +11,7 @@ from ...discovery.estimates import Estimate
 from ...discovery.finding import EffectFinding
 from ...discovery.held_out import Proof
 from ...discovery.verdict import SensorFinding, Verdict, Word
-from ...discovery.verdict_file import advice, summary, title_of, where
+from ...discovery.verdict_file import advice, open_share, summary, title_of, where
 from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml
 from .closing_plots import closing_blocks
@@ -31,6 +31,9 @@ _VERDICTS: dict[Word, tuple[str, Level]] = {
     "unexplained": ("unexplained residual", "bad"),
     "not_testable": ("not testable", "attention"),
 }
+
+PARTLY = 0.5
+"""Share of the held-out error that effects leave, from which the verdict says that they explain it in part only."""
 
 
 def save_discovery(found: Discovery, folder: Path, title: str, command: str = "") -> list[Path]:
@@ -56,7 +59,7 @@ def write_discover_report(found: Discovery, path: Path | str, command: str = "")
         title=f"Search for missing effects: {found.machine.name}, by {found.campaign}",
         purpose=f"Identify effects missing from the model of {load_of(found.machine)}, from {tests}{held}.",
         verdict=verdict_sentence(found),
-        level=_VERDICTS[found.verdict.word][1],
+        level=_verdict_of(found)[1],
         headlines=_headlines(found),
         sections=[
             Section("closing", "Error before and after", closing_blocks(found)),
@@ -73,12 +76,21 @@ def write_discover_report(found: Discovery, path: Path | str, command: str = "")
     return save_page(page, path)
 
 
+def _verdict_of(found: Discovery) -> tuple[str, Level]:
+    """The verdict in a few words, and its level; an effect that leaves most of the error is no good news alone."""
+    words, level = _VERDICTS[found.verdict.word]
+    if found.verdict.word in ("named", "ambiguous") and (left := open_share(found)) > PARTLY:
+        return f"{words}, {100.0 * left:.0f} % of the held-out error remains", "attention"
+    return words, level
+
+
 def verdict_sentence(found: Discovery) -> str:
     """Return the verdict in words, and what was identified."""
     text = summary(found)
     if text.startswith("no missing effect"):
         return text[0].upper() + text[1:]
-    return f"{_VERDICTS[found.verdict.word][0].capitalize()}: {text}"
+    words = _verdict_of(found)[0]
+    return f"{words[0].upper()}{words[1:]}: {text}"
 
 
 def discovery_tables(found: Discovery) -> list[Table]:
@@ -164,7 +176,7 @@ def _acted_on(found: Discovery) -> set[str]:
 def _headlines(found: Discovery) -> list[Headline]:
     verdict = found.verdict
     named = ", ".join(title_of(one.family) for one in verdict.effects) or "none"
-    shown = [Headline(_VERDICTS[verdict.word][0], "Verdict")]
+    shown = [Headline(_verdict_of(found)[0], "Verdict")]
     if verdict.word == "sensor":
         first = verdict.sensors[0]
         size = f"{first.estimate.value:.4g} {first.estimate.unit}"

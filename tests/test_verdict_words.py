@@ -1,0 +1,78 @@
+"""What a discovery says: its headline, captions and tables agree with the numbers beside them."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from page_cases import numbers
+
+from lhpost6_pin.discovery.discover import discovery_numbers
+from lhpost6_pin.discovery.effect_loops import squares_explained
+from lhpost6_pin.discovery.finding import EffectFinding
+from lhpost6_pin.discovery.held_out import Gap, GapTraces
+from lhpost6_pin.discovery.verdict import Verdict
+from lhpost6_pin.discovery.verdict_file import summary
+from lhpost6_pin.show.report.closing_plots import _percent, _trace_figure
+from lhpost6_pin.show.report.discover_report import _headlines, _verdict_of, verdict_sentence
+
+NUMBERS, CALIBRATION = discovery_numbers()
+
+
+def identified(*gaps: Gap, word: str = "named", **changes) -> SimpleNamespace:
+    """A discovery of backlash, as far as its words depend on it, with these gaps on held-out tests."""
+    effect = EffectFinding("backlash", ("AX",), {}, 100.0, 1e-9)
+    verdict = Verdict(word, (effect,), {}, (), None, (), **changes)
+    search = SimpleNamespace(misfit=lambda kind: 1.0)
+    proof = SimpleNamespace(gaps=gaps)
+    return SimpleNamespace(
+        verdict=verdict, proof=proof, search=search, numbers=NUMBERS, beyond=(), balances=(), skipped={}
+    )
+
+
+def test_a_headline_states_how_much_of_the_error_an_effect_leaves():
+    """Of a friction damper: 3.74 to 2.94 above a floor of 1.02 closes 29 %."""
+    found = identified(Gap("inverse dynamics", "1Hz_1in", 9.0, 3.74, 2.94, 1.02))
+    assert verdict_sentence(found).startswith("Effect identified, 71 % of the held-out error remains: ")
+    assert "71 % of the error beyond the floor remains (inverse dynamics, 1Hz_1in: " in summary(found)
+    assert _verdict_of(found)[1] == "attention"
+    assert _headlines(found)[0].value == "effect identified, 71 % of the held-out error remains"
+
+
+def test_an_effect_that_closes_the_error_is_simply_identified():
+    found = identified(Gap("inverse dynamics", "EQ", 9.0, 5.0, 1.1, 1.0), Gap("open loop", "EQ", 1.0, 1.0, 1.0, 1.0))
+    assert _verdict_of(found) == ("effect identified", "good")
+    assert "remains" not in summary(found)
+
+
+def traces(phase: str) -> GapTraces:
+    """A model that drifts from the record at which it starts, and one that does not."""
+    time = np.arange(100) / 100.0
+    measured = np.zeros(100)
+    models = np.stack([3.0 * time, 3.0 * time, measured], axis=1)
+    return GapTraces(phase, "EQ", "chamber_pressure_a", "H4", time, measured, models, 0.1)
+
+
+def test_the_error_of_a_simulation_that_starts_from_the_record_begins_at_zero():
+    """Less its mean it would begin with what it drifts to."""
+    figure = _trace_figure(traces("open loop"), 3)
+    titles = [note["text"] for note in figure.layout["annotations"]]
+    assert any("Error" in t for t in titles) and not any("mean removed" in t for t in titles)
+    refitted = [trace for trace in figure.traces if trace["name"] == "refitted"][-1]
+    assert numbers(refitted["y"])[0] == pytest.approx(0.0, abs=1e-6)  # rounding of what is stored
+
+
+def test_the_error_of_inverse_dynamics_has_the_sensors_offsets_removed():
+    titles = [note["text"] for note in _trace_figure(traces("inverse dynamics"), 3).layout["annotations"]]
+    assert any("Error, mean removed" in t for t in titles)
+
+
+def test_a_constant_effect_explains_the_squares_that_it_takes_away():
+    """A null bias: from -1.25 L/min to nothing but noise."""
+    noise = 0.02 * np.sin(np.arange(400.0))
+    assert squares_explained(noise - 1.25, noise) == pytest.approx(1.0 - 0.02**2 / 2 / 1.25**2, abs=1e-4)  # mean of sin
+    assert squares_explained(noise + 5.0, noise + 5.0) == 0.0  # a preload that stays is no part of it
+    assert squares_explained(np.zeros(4), np.zeros(4)) == 0.0
+
+
+def test_a_share_that_rounds_to_zero_has_no_sign():
+    assert (_percent(-0.0002), _percent(0.0005), _percent(-0.031)) == ("0.0 %", "0.1 %", "-3.1 %")

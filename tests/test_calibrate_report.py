@@ -123,6 +123,16 @@ def test_a_parameter_is_at_its_bound_where_no_machine_could_be_built_beyond(foun
     assert verdict_on(replace(found, estimate=far), 1) == "at its bound"  # it went as far as it may
 
 
+def test_a_number_at_its_bound_is_not_written_as_calibrated(found, tmp_path):
+    leakage = replace(found.parameters[1], lowest=-0.1)
+    parameters = (found.parameters[0], leakage, *found.parameters[2:])
+    stopped = replace(found, parameters=parameters, estimate=np.where(np.arange(7) == 1, -0.1, found.estimate))
+    written = load_machine("lhpost6", save_override(stopped, tmp_path / "o.toml")).parameters
+    assert written[leakage.name].evidence == "at_bound"
+    assert written[leakage.name].source.startswith("at the bound of its range, no estimate; calibrated from")
+    assert written["platen.mass"].evidence == "calibrated"
+
+
 def test_a_stroke_that_gives_way_to_a_chamber_is_said_and_not_passed_off_as_measured(found, tmp_path, capsys):
     assert cut_strokes(found) == []
     (chamber,) = (k for k in machine_parameters(MACHINE, {"horizontal": 0.3}) if k.name == "horizontal.chamber_a")

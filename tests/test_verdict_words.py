@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from page_cases import numbers
 
-from lhpost6_pin.discovery.discover import discovery_numbers
+from lhpost6_pin.discovery.discover import _sourced, discovery_numbers
 from lhpost6_pin.discovery.effect_loops import squares_explained
 from lhpost6_pin.discovery.finding import EffectFinding
 from lhpost6_pin.discovery.held_out import Gap, GapTraces
 from lhpost6_pin.discovery.verdict import Verdict
 from lhpost6_pin.discovery.verdict_file import summary
+from lhpost6_pin.identification.calibration.free_parameters import machine_parameters, with_parameters
+from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.show.report.closing_plots import _percent, _trace_figure
 from lhpost6_pin.show.report.discover_report import _headlines, _verdict_of, verdict_sentence
 
@@ -76,3 +78,23 @@ def test_a_constant_effect_explains_the_squares_that_it_takes_away():
 
 def test_a_share_that_rounds_to_zero_has_no_sign():
     assert (_percent(-0.0002), _percent(0.0005), _percent(-0.031)) == ("0.0 %", "0.1 %", "-3.1 %")
+
+
+def test_a_number_at_its_bound_is_no_calibrated_number_of_the_model():
+    """Such as a yield slip smaller than the displacement transducer resolves."""
+    machine = load_machine("lhpost6")
+    parameters = machine_parameters(machine)
+    names = [p.name for p in parameters]
+    prior = np.array([p.sd for p in parameters])
+    lowest, highest = np.array([(p.lowest, p.highest) for p in parameters]).T
+    x, slip, force = np.zeros(len(names)), names.index("vertical.seal_yield"), names.index("vertical.seal_friction")
+    x[slip], x[force] = max(-CALIBRATION.number("fit.reach") * prior[slip], lowest[slip]), prior[force]
+    problem = SimpleNamespace(parameters=parameters, names=names, prior=prior, lowest=lowest, highest=highest)
+    found = SimpleNamespace(problem=problem, calibration=CALIBRATION, solution=SimpleNamespace(x=x))
+    fitted = with_parameters(machine, parameters, x)
+    model = _sourced(fitted, found, machine, SimpleNamespace(name="lab")).parameters
+    assert model["vertical.seal_yield"].evidence == "at_bound"
+    assert model["vertical.seal_yield"].source.startswith(
+        "at the bound of its range, no estimate; fitted to campaign lab"
+    )
+    assert model["vertical.seal_friction"].evidence == "calibrated"

@@ -100,7 +100,7 @@ def _loop_figure(loops: Sequence[EffectLoop]) -> Figure:
 
 
 def _share_table(found: Discovery) -> Table:
-    """Share of the squared error that each effect explains in its own column, and in every phase; and all of them there."""
+    """Share of the squared error that each effect explains in its own column and in every phase, and all of them."""
     rows = [(title_of(o.family), f"{o.column}, {o.test}", _percent(o.explained)) for o in found.loops]
     titles = {one.candidate.name: title_of(one.candidate.family.named) for one in found.search.added}
     every = next(iter(titles.values())) if len(titles) == 1 else "all effects"

@@ -1,11 +1,13 @@
 """What a discovery says: its headline, captions and tables agree with the numbers beside them."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from page_cases import numbers
 
+from lhpost6_pin.discovery.balances import Balance
 from lhpost6_pin.discovery.discover import _sourced, discovery_numbers
 from lhpost6_pin.discovery.effect_loops import squares_explained
 from lhpost6_pin.discovery.finding import EffectFinding
@@ -15,7 +17,7 @@ from lhpost6_pin.discovery.verdict_file import summary
 from lhpost6_pin.identification.calibration.free_parameters import machine_parameters, with_parameters
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.show.report.closing_plots import _percent, _trace_figure
-from lhpost6_pin.show.report.discover_report import _headlines, _verdict_of, verdict_sentence
+from lhpost6_pin.show.report.discover_report import _balance_words, _headlines, _verdict_of, verdict_sentence
 
 NUMBERS, CALIBRATION = discovery_numbers()
 
@@ -98,3 +100,11 @@ def test_a_number_at_its_bound_is_no_calibrated_number_of_the_model():
         "at the bound of its range, no estimate; fitted to campaign lab"
     )
     assert model["vertical.seal_friction"].evidence == "calibrated"
+
+
+def test_what_balances_leave_out_is_stated_below_them():
+    """Other commands take all samples, and records as they are: 20 % stood beside 2 % of one table."""
+    whole = Balance("wrench", "EQ", (9.0, 5.0, 1.0), (0.4, 0.1, 0.02), (0.8, 0.98, 1.0))
+    assert "sensors' errors were corrected" in _balance_words([whole])
+    assert "friction" not in _balance_words([whole])
+    assert "in the 68 % of EQ where friction's slip is known" in _balance_words([replace(whole, slip_known=0.68)])

@@ -29,6 +29,7 @@ class Balance:
     error: tuple[float, float, float]  # normalised RMS, 1 is sensor noise
     share: tuple[float, float, float] | None = None  # RMS error over RMS measured, of the wrench
     explained: tuple[float, float, float] | None = None  # R2 of the wrench
+    slip_known: float = 1.0  # share of the test that the wrench is compared in: where friction's slip is known
 
 
 class HeldOut(NamedTuple):
@@ -58,10 +59,12 @@ def evaluate_balances(held: Problem, three: Sequence[HeldOut]) -> tuple[Balance,
             if not rows.any():
                 continue
             error = [float(np.sqrt(np.mean(np.abs(one.whitened[t][:, rows]) ** 2))) for one in three]
-            share = explained = None
+            share, explained, known = None, None, 1.0
             if kind == "wrench" and (left := _left(held, three, t, forces)) is not None:
                 share, explained = _three(np.sqrt(left)), _three(1.0 - left)
-            found.append(Balance(kind, test.name, _three(np.array(error)), share, explained))
+            if kind == "wrench" and test.weight is not None:
+                known = float(test.weight.mean())
+            found.append(Balance(kind, test.name, _three(np.array(error)), share, explained, known))
     return tuple(found)
 
 

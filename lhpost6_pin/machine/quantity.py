@@ -13,8 +13,10 @@ __all__ += ["vector_length"]
 
 Value: TypeAlias = float | tuple[float, ...]
 
-EVIDENCE = ("report", "measured", "derived", "drawn", "assumed", "standard", "numerical", "calibrated", "at_bound")
-EVIDENCE += ("override",)
+EVIDENCE = (
+    *("report", "measured", "derived", "drawn", "assumed", "standard"),
+    *("numerical", "calibrated", "at_bound", "override"),
+)
 """How well a number is known, strongest claim first; `at_bound` is where a fit ended at the bound of a number's range,
 which is no estimate; `override` is what a user set by hand."""
 

@@ -90,7 +90,7 @@ def print_agreement(found: Decomposed, agreement: WrenchAgreement) -> None:
     """Print a specimen's interface wrench, the residual with its expected size, and errors of the modelled forces."""
     how = f"Modelled against measured forces up to {found.comparison.band.high:g} Hz"
     interface = [] if agreement.interface is None else [interface_table(agreement.interface)]
-    print_blocks(*interface, how, *residual_tables(found, agreement), *match_tables(found, agreement))
+    print_blocks(*interface, how, *residual_tables(found, agreement), *match_tables(found, agreement), found.slip)
 
 
 def print_discovery(found: Discovery) -> None:

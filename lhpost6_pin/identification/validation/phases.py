@@ -27,6 +27,7 @@ from ...simulation.rehearse import rehearse, replay
 from ...simulation.simulate import fastest_engine
 from ...tuning.drives import load_drive
 from ..decompose.record import decompose_test
+from ..known_slip import slip_summary
 from .phase_agreement import ColumnAgreement, ComparedQuantity, agree
 from .prepare_tests import PreparedTest, wrench_calibration
 from .simulated_phases import Lag, SimulatedComparison
@@ -58,6 +59,7 @@ class Phase:
     resonances: tuple[Resonance, ...] = ()
     lags: tuple[Lag, ...] = ()  # of a closed loop behind its reference
     notes: tuple[str, ...] = ()
+    slip: str = ""  # in which share of inverse dynamics friction's slip is unknown, and the error in the rest
     reason: str | None = None
 
     def pair(self, quantity: str) -> ComparedQuantity | None:
@@ -94,7 +96,12 @@ def _inverse_dynamics(test: PreparedTest) -> Phase:
             pairs.append(ComparedQuantity(quantity, columns, measured, model, *spread, known))
     ours, theirs, noise = (x[:, axes] for x in (found.measured, found.required, again.measured - found.measured))
     spectrum = estimate_spectrum("wrench", columns, ours, theirs, noise, test.test.dt, numbers)
-    return Phase(1, test.test.name, test.time, tuple(pairs), agree(pairs, test.test.dt, numbers), spectrum, notes=notes)
+    edge = round(numbers.edge / test.test.dt)
+    inside = slice(edge, test.test.samples - edge)
+    ours, theirs = (numbers.band.apply(x, test.test.dt)[inside] for x in (found.measured, found.residual))
+    slip = slip_summary(found.states.plant, test.test, ours, theirs, inside)
+    agreement = agree(pairs, test.test.dt, numbers)
+    return Phase(1, test.test.name, test.time, tuple(pairs), agreement, spectrum, notes=notes, slip=slip)
 
 
 def _open_loop(test: PreparedTest) -> Phase:

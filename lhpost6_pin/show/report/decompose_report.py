@@ -197,6 +197,7 @@ def _assumptions(found: Decomposed) -> list[Block]:
     band = found.comparison.band
     lines = [
         *found.notes,
+        *filter(None, [found.slip]),
         f"All compared signals are low-passed by one zero-phase filter (gain 1/2 at {band.high:g} Hz, order "
         f"{band.order}); {found.comparison.edge:g} s at each end are omitted. Friction states are integrated along the "
         "unfiltered motion, from rest. Power and energy are those of the unfiltered forces.",

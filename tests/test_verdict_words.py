@@ -14,19 +14,28 @@ from lhpost6_pin.discovery.finding import EffectFinding
 from lhpost6_pin.discovery.held_out import Gap, GapTraces
 from lhpost6_pin.discovery.verdict import Verdict
 from lhpost6_pin.discovery.verdict_file import summary
+from lhpost6_pin.discovery.verdict_notes import balance_note, floor_note, interval_note, refit_summary
 from lhpost6_pin.identification.calibration.free_parameters import machine_parameters, with_parameters
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.show.report.closing_plots import _percent, _trace_figure
-from lhpost6_pin.show.report.discover_report import _balance_words, _headlines, _verdict_of, verdict_sentence
+from lhpost6_pin.show.report.discover_plots import gap_figure, held_out_errors
+from lhpost6_pin.show.report.discover_report import (
+    _balance_table,
+    _headlines,
+    _proof_table,
+    _verdict_of,
+    verdict_sentence,
+)
 
 NUMBERS, CALIBRATION = discovery_numbers()
 
 
-def identified(*gaps: Gap, word: str = "named", **changes) -> SimpleNamespace:
+def identified(*gaps: Gap, word: str = "named", misfit: float = 1.0, **changes) -> SimpleNamespace:
     """A discovery of backlash, as far as its words depend on it, with these gaps on held-out tests."""
     effect = EffectFinding("backlash", ("AX",), {}, 100.0, 1e-9)
     verdict = Verdict(word, (effect,), {}, (), None, (), **changes)
-    search = SimpleNamespace(misfit=lambda kind: 1.0)
+    problem = SimpleNamespace(kinds=("wrench",))
+    search = SimpleNamespace(misfit=lambda kind: misfit, calibration=CALIBRATION, problem=problem, added=("backlash",))
     proof = SimpleNamespace(gaps=gaps)
     return SimpleNamespace(
         verdict=verdict, proof=proof, search=search, numbers=NUMBERS, beyond=(), balances=(), skipped={}
@@ -105,6 +114,52 @@ def test_a_number_at_its_bound_is_no_calibrated_number_of_the_model():
 def test_what_balances_leave_out_is_stated_below_them():
     """Other commands take all samples, and records as they are: 20 % stood beside 2 % of one table."""
     whole = Balance("wrench", "EQ", (9.0, 5.0, 1.0), (0.4, 0.1, 0.02), (0.8, 0.98, 1.0))
-    assert "sensors' errors were corrected" in _balance_words([whole])
-    assert "friction" not in _balance_words([whole])
-    assert "in the 68 % of EQ where friction's slip is known" in _balance_words([replace(whole, slip_known=0.68)])
+    assert "sensors' errors were corrected" in balance_note([whole])
+    assert "slip" not in balance_note([whole])
+    assert "in the 68 % of EQ where friction's slip is known" in balance_note([replace(whole, slip_known=0.68)])
+
+
+def test_balances_and_phases_have_their_own_units():
+    """Sensor noise alone is the unit of a phase, the expected scatter that of a balance: 248 stands beside 0.38."""
+    found = identified(Gap("inverse dynamics", "1Hz_1in", 702.0, 316.0, 248.0, 15.4))
+    found.balances = (Balance("wrench", "1Hz_1in", (0.85, 0.47, 0.38)),)
+    assert list(held_out_errors(found)) == [
+        ("inverse dynamics, 1Hz_1in", "sensor noise"),
+        ("wrench, 1Hz_1in", "expected scatter"),
+    ]
+    assert "times sensor noise" in summary(found)
+    assert _balance_table(found.balances).header[1] == "Error over expected scatter"
+    assert "sensor noise alone" in _proof_table(found.proof).caption
+    names = [note["text"] for note in gap_figure(found).layout["annotations"]]
+    assert {"inverse dynamics, 1Hz_1in: over sensor noise", "wrench, 1Hz_1in: over expected scatter"} <= {*names}
+    assert _headlines(found)[-1].note.endswith("1 is the sensor noise")
+
+
+def test_beside_intervals_stands_that_misfit_is_left():
+    """A search with a mean square of 4 stated 387.6 to 391.2 N; the truth was 400 N."""
+    closed = Gap("inverse dynamics", "EQ", 9.0, 5.0, 1.0, 1.0)
+    assert interval_note(identified(closed)) == ""
+    words = interval_note(identified(closed, misfit=4.0))
+    assert "misfit of wrench is left" in words and "too narrow" in words
+    assert "too narrow" in interval_note(identified(Gap("inverse dynamics", "EQ", 9.0, 5.0, 3.0, 1.0)))
+
+
+def test_a_phase_at_its_floor_before_any_effect_is_no_evidence():
+    """2.35, 1.47, 1.14 at a floor of 1.73: the refit is below what a model that lacks nothing leaves."""
+    found = identified(Gap("inverse dynamics", "EQ", 2.35, 1.47, 1.14, 1.73))
+    assert floor_note(found).startswith("At the floor without effects already: inverse dynamics, EQ.")
+    assert floor_note(identified(Gap("inverse dynamics", "EQ", 9.0, 5.0, 1.1, 1.0))) == ""
+
+
+def test_what_a_refit_explains_a_fall_of_the_error_by_is_stated(monkeypatch):
+    """No missing effect and no parameter, yet 20.3 fell to 1.06: by errors of sensors."""
+    found = identified(Gap("inverse dynamics", "EQ", 20.3, 1.06, 1.06, 1.0), word="none")
+    found.search.problem = SimpleNamespace(
+        kinds=(), parameters=("mass",), names=("mass", "gain force", "offset force"), delays=()
+    )
+    found.search.solution = SimpleNamespace(x=np.array([0.0, 0.05, 1e-9]))
+    monkeypatch.setattr("lhpost6_pin.discovery.verdict_notes.deviations", lambda search: np.full(3, 1e-3))
+    assert "20.3 to 1.06 times sensor noise) by errors of sensors within their ranges, foremost gain force." in (
+        refit_summary(found)
+    )
+    assert refit_summary(identified(Gap("inverse dynamics", "EQ", 1.3, 1.0, 1.0, 1.0), word="none")) == ""

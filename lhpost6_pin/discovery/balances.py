@@ -1,8 +1,9 @@
 """Balances on held-out tests: what models leave of the measured forces and flows of tests that were not searched.
 
 Three models as in `held_out`, each with its sensor errors. Per kind of residual: the normalised RMS error in units of
-sensor noise; of the wrench also the error of its forces over the measured actuator forces, and the share R2 of their
-variance explained, over the band that is compared, without the mean.
+the expected scatter (sensor noise, and what the form of friction and the oil's temperature leave open); of the wrench
+also the error of its forces over the measured actuator forces, and the share R2 of their variance explained, over the
+band that is compared, without the mean.
 """
 
 from collections.abc import Sequence
@@ -26,7 +27,7 @@ class Balance:
 
     kind: str
     test: str
-    error: tuple[float, float, float]  # normalised RMS, 1 is sensor noise
+    error: tuple[float, float, float]  # normalised RMS, 1 is the expected scatter
     share: tuple[float, float, float] | None = None  # RMS error over RMS measured, of the wrench
     explained: tuple[float, float, float] | None = None  # R2 of the wrench
     slip_known: float = 1.0  # share of the test that the wrench is compared in: where friction's slip is known

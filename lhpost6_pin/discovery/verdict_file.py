@@ -18,13 +18,13 @@ from .discover import Discovery
 from .estimates import Estimate
 from .finding import EffectFinding
 from .floor import NOISE
-from .held_out import Gap
 from .search_state import Round
 from .unexplained import forces_explained
 from .verdict import SensorFinding
+from .verdict_notes import interval_note, open_summary, refit_summary
 from .withdrawal import Why
 
-__all__ = ["advice", "open_share", "save_verdict", "summary", "title_of", "verdict_entries", "where"]
+__all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "where"]
 
 
 _WITHDRAWN: dict[Why, str] = {
@@ -39,10 +39,7 @@ CONSIDERED = 1.0
 """Gain of log-likelihood from which a candidate is listed."""
 
 REMAINS = 0.01
-"""Share of the squares beyond noise from which what remains is stated."""
-
-OPEN = 0.1
-"""Share of a gap beyond its floor from which it is stated that the effects leave it."""
+"""Share of the squares beyond the expected scatter from which what remains is stated."""
 
 WORSE = 1.05
 """Normalised RMS error on a held-out test over that before, from which it counts as worse."""
@@ -92,6 +89,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "not_testable": list(verdict.untestable),
         "at_bound": list(verdict.bounded),
         "remainder": dict(found.verdict.remainder),
+        "intervals_too_narrow": bool(interval_note(found)),
         "considered": [_considered(one) for one in found.search.rounds],
         "withdrawn": [
             {"name": w.name, "family": w.family, "why": w.why, "numbers": list(w.numbers), "gain": _known(w.gain)}
@@ -207,8 +205,10 @@ def summary(found: Discovery) -> str:
         text += f" {beyond[0].upper()}{beyond[1:]}."
     if verdict.word in ("named", "ambiguous"):
         left = [f"{100.0 * share:.2g} % ({kind})" for kind, share in verdict.remainder.items() if share > REMAINS]
-        text += f" Of the squares beyond noise remain {', '.join(left)}." if left else ""
-        text += _open_summary(found)
+        text += f" Of the squares beyond the expected scatter remain {', '.join(left)}." if left else ""
+        text += open_summary(found)
+    if verdict.word in ("none", "parameters_only", "sensor"):
+        text += refit_summary(found)
     identified = {one.family for one in verdict.effects}
     for why, reason in _WITHDRAWN.items():
         gone = dict.fromkeys(one.family for one in verdict.withdrawn if one.why == why)
@@ -230,26 +230,6 @@ def summary(found: Discovery) -> str:
     if verdict.effects and found.proof is None:
         return f"{text} Not validated, as no test was held out: add tests, or name one with --hold-out."
     return text
-
-
-def open_share(found: Discovery) -> float:
-    """Largest share of a held-out gap beyond its floor that the effects leave; zero where no gap was open."""
-    return max((1.0 - gap.closure for gap in _open_gaps(found)), default=0.0)
-
-
-def _open_gaps(found: Discovery) -> list[Gap]:
-    """The gaps of held-out tests that were open before the effects."""
-    return [gap for gap in found.proof.gaps if not math.isnan(gap.closure)] if found.proof else []
-
-
-def _open_summary(found: Discovery) -> str:
-    """How much of the widest gap the effects leave; empty where that is little."""
-    if open_share(found) <= OPEN:
-        return ""
-    gap = min(_open_gaps(found), key=lambda one: one.closure)
-    sizes = f"normalised RMS error {gap.refitted:.3g} to {gap.after:.3g}, floor {gap.floor:.3g}"
-    left = f"{100.0 * (1.0 - gap.closure):.0f} % of the error beyond the floor remains"
-    return f" On held-out tests {left} ({gap.phase}, {gap.test}: {sizes})."
 
 
 def _name_of(one: EffectFinding) -> str:
@@ -287,20 +267,20 @@ def _worse(found: Discovery) -> str | None:
 
 
 def _scatter(found: Discovery) -> str | None:
-    """That forces exceed sensor noise, but are explained well enough for friction; None where they do not."""
+    """That forces exceed the expected scatter, but are explained well enough for friction; None where they do not."""
     n, misfit = found.numbers.number, found.search.misfit("wrench")
     if not (misfit > n("verdict.unexplained") and forces_explained(found.search)):
         return None
     share = np.sqrt(found.search.calibration.number("friction.enough"))
     return (
-        f"The residual of forces is {np.sqrt(misfit):.3g} times sensor noise, but within {100.0 * share:g} % of the "
-        "forces, as friction varies from stroke to stroke."
+        f"The residual of forces is {np.sqrt(misfit):.3g} times the expected scatter, but within {100.0 * share:g} % "
+        "of the forces, as friction varies from stroke to stroke."
     )
 
 
 def _unexplained_summary(found: Discovery, effects: str) -> str:
     verdict = found.verdict
-    function, place = verdict.residual_function, "the residual exceeds noise"
+    function, place = verdict.residual_function, "the residual exceeds the expected scatter"
     if function is not None:
         place = f"an effect acts on {where(function.components)}, as a function of {function.description}"
     elif drifting := [s.name.partition(" ")[2] for s in verdict.sensors if s.name.startswith("drift ")]:

@@ -11,6 +11,7 @@ from ...identification.calibration.calibration_summary import (
     correlation_summary,
     cut_strokes,
     delay_summary,
+    interval_summary,
     range_summary,
 )
 from ...identification.calibration.result import beyond, contradictions, far, stated_range, verdict_on
@@ -78,7 +79,8 @@ def parameter_blocks(calibration: Calibration) -> list[Block]:
         "components of its kind, which move together."
     )
     tables = (parameter_table(calibration), *ratio_tables(calibration))
-    return [forest_figure(calibration), how, *tables, *cut_strokes(calibration)]
+    narrow = filter(None, [interval_summary(calibration)])
+    return [forest_figure(calibration), how, *narrow, *tables, *cut_strokes(calibration)]
 
 
 def ratio_tables(calibration: Calibration) -> list[Table]:

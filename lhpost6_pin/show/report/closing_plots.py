@@ -61,7 +61,7 @@ def _trace_figure(one: GapTraces, count: int) -> Figure:
     styles = (DELIVERED, BEFORE, AFTER)[:count]
     values += [Trace(n, x, s) for n, x, s in zip(names, one.models.T[:count], styles, strict=True)]
     rest = [Trace(n, x, s) for n, x, s in zip(names[1:], errors.T[1:count], styles[1:], strict=True)]
-    noise = {"2 σ of noise": 2.0 * one.noise, "": -2.0 * one.noise}
+    noise = {"2 σ of sensor noise": 2.0 * one.noise, "": -2.0 * one.noise}
     what = f"{one.quantity.replace('_', ' ')}, {one.column}"
     rows = [
         Row(what[0].upper() + what[1:], values, scale),

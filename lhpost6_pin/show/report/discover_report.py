@@ -11,13 +11,20 @@ from ...discovery.estimates import Estimate
 from ...discovery.finding import EffectFinding
 from ...discovery.held_out import Proof
 from ...discovery.verdict import SensorFinding, Verdict, Word
-from ...discovery.verdict_file import advice, open_share, summary, title_of, where
+from ...discovery.verdict_file import advice, summary, title_of, where
+from ...discovery.verdict_notes import EXPECTED_SCATTER, balance_note, floor_note, interval_note, open_share
 from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml
 from .closing_plots import closing_blocks
 from .control_blocks import load_of, numbers_used
 from .curve_plots import curve_blocks
-from .discover_plots import gain_figure, gap_figure, held_out_errors, map_blocks, residual_function_figure
+from .discover_plots import (
+    gain_figure,
+    gap_figure,
+    held_out_errors,
+    map_blocks,
+    residual_function_figure,
+)
 from .page import Block, Headline, Level, Page, Section, Table, bullet_list, details, number, save_page
 
 __all__ = ["discovery_tables", "save_discovery", "verdict_sentence", "write_discover_report"]
@@ -104,8 +111,10 @@ def discovery_tables(found: Discovery) -> list[Table | str]:
     sensors = [_sensor_table(verdict.sensors)] if verdict.sensors else []
     proof = [_proof_table(found.proof)] if found.proof else []
     balances = [_balance_table(found.balances)] if found.balances else []
-    words = [_balance_words(found.balances)] if found.balances else []
-    return [*map(_effect_table, verdict.effects), *changed, *sensors, *proof, *balances, *words]
+    words = [balance_note(found.balances)] if found.balances else []
+    effects = list(map(_effect_table, verdict.effects))
+    narrow = [interval_note(found)] if effects or changed else []
+    return [*effects, *changed, *narrow, *sensors, *proof, floor_note(found), *balances, *words]
 
 
 def _balance_table(balances: Sequence[Balance]) -> Table:
@@ -123,23 +132,8 @@ def _balance_table(balances: Sequence[Balance]) -> Table:
         )
         for one in balances
     ]
-    header = ("Balance and test", "Error over noise", "Error over measured force", "R²")
+    header = ("Balance and test", "Error over expected scatter", "Error over measured force", "R²")
     return Table("Balances of held-out tests: as delivered → refitted → with the effects", header, rows)
-
-
-def _balance_words(balances: Sequence[Balance]) -> str:
-    """What balances leave out, which decompose and validate show."""
-    words = (
-        "Balances are of records whose sensors' errors were corrected as fitted; model.toml holds the machine without "
-        "them, so that decompose and validate, which take records as they are, show larger errors."
-    )
-    least = min((one for one in balances if one.kind == "wrench"), key=lambda one: one.slip_known, default=None)
-    if least is not None and least.slip_known < 1.0:
-        words += (
-            f" The wrench is compared in the {100.0 * least.slip_known:.0f} % of {least.test} where friction's slip is "
-            "known; in the rest the displacement's noise hides it, and the modelled friction is noise."
-        )
-    return words
 
 
 def _sensor_table(sensors: Sequence[SensorFinding]) -> Table:
@@ -181,7 +175,7 @@ def _proof_table(proof: Proof) -> Table:
         for gap in proof.gaps
     ]
     header = ("Phase and test", "As delivered", "Refitted", "With the effects", "Floor", "Closure")
-    return Table("Normalised RMS error on held-out tests (1: sensor noise)", header, rows)
+    return Table("Normalised RMS error on held-out tests (1: sensor noise alone)", header, rows)
 
 
 def _acted_on(found: Discovery) -> set[str]:
@@ -200,12 +194,12 @@ def _headlines(found: Discovery) -> list[Headline]:
     else:
         shown.append(Headline(named, "Effects"))
     if errors := held_out_errors(found):
-        widest, (_, refitted, after) = max(errors.items(), key=lambda one: one[1][1])
+        (widest, unit), (_, refitted, after) = max(errors.items(), key=lambda one: one[1][1])
         shown.append(
             Headline(
                 f"{number(refitted)} → {number(after)}",
                 f"Largest normalised RMS error: {widest}",
-                "refitted → with the effects; 1 is sensor noise",
+                f"refitted → with the effects; 1 is the {unit}",
             )
         )
     return shown
@@ -224,7 +218,9 @@ def _effect_blocks(found: Discovery) -> list[Block]:
         blocks.append(Table("Families fitted in an effect's place", ("On", "Family", "Probability"), chances))
     if verdict.remainder:
         left = [(kind, f"{100.0 * share:.2g} %") for kind, share in verdict.remainder.items()]
-        blocks.append(Table("Remainder of the squares beyond noise", ("Residual", "Share of the refit's"), left))
+        blocks.append(
+            Table("Remainder of the squares beyond the expected scatter", ("Residual", "Share of the refit's"), left)
+        )
     for one in verdict.effects:
         family = find_family(one.form or one.family)
         p_value = "less than 1e-300" if one.p_value < 1e-300 else f"{one.p_value:.1g}"
@@ -234,6 +230,8 @@ def _effect_blocks(found: Discovery) -> list[Block]:
             f"{family.equation}. Gain of log-likelihood {number(one.gain)}; p-value, corrected for the number of "
             f"candidates: {p_value}. Often confused with: {confused}.",
         ]
+    if verdict.effects:
+        blocks += filter(None, [interval_note(found)])
     if lines := advice(found):
         blocks += ["The campaign does not distinguish the candidates. Tests that would:", bullet_list(lines)]
     if found.next_tests:  # simulated with one effect and fitted with the other
@@ -252,7 +250,8 @@ def _effect_blocks(found: Discovery) -> list[Block]:
         blocks.append(residual_function_figure(verdict.residual_function))
     elif verdict.word == "unexplained":
         blocks.append(
-            "The residual exceeds noise and is not a function of an actuator's or strut's position or velocity."
+            "The residual exceeds the expected scatter and is no function of an actuator's or strut's position or "
+            "velocity."
         )
     if verdict.where:
         blocks.append(f"The largest residuals are in: {'; '.join(s.description for s in verdict.where)}.")
@@ -279,7 +278,7 @@ def _proof_blocks(found: Discovery) -> list[Block]:
         _proof_table(found.proof),
         closure,
         _balance_table(found.balances),
-        _balance_words(found.balances),
+        balance_note(found.balances),
     ]
 
 
@@ -309,14 +308,17 @@ def _considered(found: Discovery) -> list[Block]:
 
 def _parameter_blocks(found: Discovery) -> list[Block]:
     changed, sensors = found.verdict.changed, found.verdict.sensors
+    narrow = filter(None, [interval_note(found)] if changed else [])
     return [
         _changed_table(found.verdict) if changed else "No parameter differs.",
+        *narrow,
         _sensor_table(sensors) if sensors else "All sensors are within the ranges of the sensors file.",
     ]
 
 
 def _assumptions(found: Discovery) -> list[Block]:
     lines = [
+        EXPECTED_SCATTER,
         "Priors of parameters and ranges of sensor errors are from the machine's and the sensors' files; most are "
         "assumed. Noise is simulated from the sensors' file, not estimated from the residual.",
         "A fitted parameter within 3 sigma of its prior counts as calibration; beyond that it is reported as an "
@@ -324,5 +326,7 @@ def _assumptions(found: Discovery) -> list[Block]:
         "Candidates are ranked to first order; the best are fitted in full together with all known unknowns.",
     ]
     if hidden := found.verdict.untestable:
-        lines.append(f"Not testable with this campaign: {', '.join(hidden)}; typical sizes are within the noise.")
+        lines.append(
+            f"Not testable with this campaign: {', '.join(hidden)}; typical sizes are within the expected scatter."
+        )
     return [bullet_list(lines), numbers_used(found.numbers)]

@@ -21,6 +21,7 @@ from lhpost6_pin.identification.calibration.override import save_override
 from lhpost6_pin.identification.calibration.result import (
     changed_parameters,
     contradictions,
+    far,
     out_of_range,
     verdict_on,
 )
@@ -121,6 +122,15 @@ def test_a_parameter_is_at_its_bound_where_no_machine_could_be_built_beyond(foun
         assert verdict_on(replace(found, parameters=parameters, estimate=estimate), 1) == verdict
     far = np.where(np.arange(7) == 1, -found.numbers.number("fit.reach") * found.prior, found.estimate)
     assert verdict_on(replace(found, estimate=far), 1) == "at its bound"  # it went as far as it may
+
+
+def test_a_parameter_of_which_nothing_is_known_has_not_changed(found):
+    """Three deviations off while its deviation is 0.99 of the prior's: 4 differed, and 3 were identifiable."""
+    i = found.names.index("vertical.seal_shape")
+    moved = replace(found, estimate=np.where(np.arange(7) == i, -3.5 * found.sd, found.estimate))
+    assert not moved.informed[i] and abs(far(moved)[i]) > found.limit
+    assert verdict_on(moved, i) == "not informed"
+    assert i not in changed_parameters(moved)
 
 
 def test_a_number_at_its_bound_is_not_written_as_calibrated(found, tmp_path):

@@ -230,6 +230,7 @@ def test_discover_names_the_backlash_and_nothing_else(loose):
     found = discover(machine, campaign, sensors, hold_out=["middle"], phases=(1,), propose=False)
     assert found.verdict.word == "named"
     assert [(one.family, one.components) for one in found.verdict.effects] == [("backlash", ("AX",))]
+    assert not {"backlash", "stribeck_friction"} & set(found.verdict.untestable)  # forms of friction were all fitted
     gap = found.verdict.effects[0].parameters["gap"]
     assert gap.value == pytest.approx(GAP, rel=0.1)
     (balance,) = [one for one in found.balances if one.kind == "wrench"]

@@ -14,7 +14,7 @@ from lhpost6_pin.discovery.finding import EffectFinding
 from lhpost6_pin.discovery.held_out import Gap, GapTraces
 from lhpost6_pin.discovery.verdict import Verdict
 from lhpost6_pin.discovery.verdict_file import summary
-from lhpost6_pin.discovery.verdict_notes import balance_note, floor_note, interval_note, refit_summary
+from lhpost6_pin.discovery.verdict_notes import balance_note, before_screening, floor_note, interval_note, refit_summary
 from lhpost6_pin.identification.calibration.free_parameters import machine_parameters, with_parameters
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.show.report.closing_plots import _percent, _trace_figure
@@ -163,3 +163,15 @@ def test_what_a_refit_explains_a_fall_of_the_error_by_is_stated(monkeypatch):
         refit_summary(found)
     )
     assert refit_summary(identified(Gap("inverse dynamics", "EQ", 1.3, 1.0, 1.0, 1.0), word="none")) == ""
+
+
+def test_an_effect_added_before_the_screening_is_listed_with_the_rounds():
+    """No bar of round 1 reached the least gain of 20, while the effect of the verdict had a gain of 308."""
+    library = SimpleNamespace(named="backlash")
+    one = SimpleNamespace(
+        candidate=SimpleNamespace(family=library, components=("AX",)),
+        gain=307.96, forms=("stribeck_friction", "backlash"), from_lengths=0.0,
+    )  # fmt: skip
+    screened = SimpleNamespace(candidate=one.candidate, gain=9.0, forms=(), from_lengths=0.0)
+    (words,) = before_screening(SimpleNamespace(added=(one, screened)))
+    assert "backlash on AX" in words and "308" in words and "stribeck_friction" in words

@@ -21,7 +21,7 @@ from .floor import NOISE
 from .search_state import Round
 from .unexplained import forces_explained
 from .verdict import SensorFinding
-from .verdict_notes import interval_note, open_summary, refit_summary
+from .verdict_notes import before_screening, interval_note, open_summary, refit_summary
 from .withdrawal import Why
 
 __all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "where"]
@@ -90,6 +90,7 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "at_bound": list(verdict.bounded),
         "remainder": dict(found.verdict.remainder),
         "intervals_too_narrow": bool(interval_note(found)),
+        "before_screening": before_screening(found.search),
         "considered": [_considered(one) for one in found.search.rounds],
         "withdrawn": [
             {"name": w.name, "family": w.family, "why": w.why, "numbers": list(w.numbers), "gain": _known(w.gain)}

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = [
     "EXPECTED_SCATTER",
     "balance_note",
+    "before_screening",
     "floor_note",
     "interval_note",
     "open_share",
@@ -106,6 +107,24 @@ def interval_note(found: "Discovery") -> str:
         f"Intervals allow for the expected scatter, not for errors of the model: misfit {where} is left beyond it, so "
         "that they are too narrow."
     )
+
+
+def before_screening(search: Search) -> list[str]:
+    """Effects that were added before the library was screened, and by what: no round has their gains."""
+    out = []
+    for one in search.added:
+        name, on = one.candidate.family.named, ", ".join(one.candidate.components)
+        if one.forms:
+            how = f"by the held-out error of forms of friction, fitted in full ({', '.join(one.forms)})"
+        elif one.from_lengths:
+            how = "by the lengths of actuators against the platen's pose"
+        else:
+            continue
+        out.append(
+            f"Before any round: {name} on {on}, identified {how}; gain of log-likelihood {one.gain:.4g}. Rounds add "
+            "effects to the model with it, so that they do not show its gain."
+        )
+    return out
 
 
 def balance_note(balances: Sequence[Balance]) -> str:

@@ -73,10 +73,11 @@ def parameter_blocks(calibration: Calibration) -> list[Block]:
     informed, material = (calibration.numbers.number(f"report.{n}") for n in ("informed", "material"))
     how = (
         "At its bound: the limit of the fit, from its prior or from an unbuildable machine. "
-        f"Changed: more than {calibration.limit:g} predicted deviations and {material:g} prior deviations from "
-        f"nominal. Unchanged: less, and identifiable (predicted deviation below {informed:g} of the prior's). Not "
-        "informed: mostly the prior. In brackets: predicted deviations from nominal. A height is the mean over the "
-        "components of its kind, which move together."
+        f"Changed: identifiable (predicted deviation below {informed:g} of the prior's), and more than "
+        f"{calibration.limit:g} predicted deviations and {material:g} prior deviations from nominal. Unchanged: "
+        "identifiable, and less. Not informed: the tests hardly narrow it, and where it moved it followed others. In "
+        "brackets: predicted deviations from nominal. A height is the mean over the components of its kind, which move "
+        "together."
     )
     tables = (parameter_table(calibration), *ratio_tables(calibration))
     narrow = filter(None, [interval_summary(calibration)])

@@ -101,6 +101,8 @@ def _headlines(found: Decomposed, agreement: WrenchAgreement) -> list[Headline]:
     for match, what in ((agreement.actuators, "total actuator force"), (agreement.dissipative, "dissipative force")):
         worst = max(moved, key=lambda k: float(match.rrmse_varying[k]))
         note = f"{AXES[worst]}; {percent(float(match.rrmse[worst]))} including the mean"
+        if len(moved) < len(found.plant.axes):
+            note += f"; of the axes that move ({', '.join(AXES[k] for k in moved)}), not those almost at rest"
         label = f"Worst RRMSE of the {what}, mean removed"
         tiles.append(Headline(percent(float(match.rrmse_varying[worst])), label, note))
     if found.sensors is not None:

@@ -12,7 +12,14 @@ from ...discovery.finding import EffectFinding
 from ...discovery.held_out import Proof
 from ...discovery.verdict import SensorFinding, Verdict, Word
 from ...discovery.verdict_file import advice, summary, title_of, where
-from ...discovery.verdict_notes import EXPECTED_SCATTER, balance_note, floor_note, interval_note, open_share
+from ...discovery.verdict_notes import (
+    EXPECTED_SCATTER,
+    balance_note,
+    before_screening,
+    floor_note,
+    interval_note,
+    open_share,
+)
 from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml
 from .closing_plots import closing_blocks
@@ -284,7 +291,7 @@ def _proof_blocks(found: Discovery) -> list[Block]:
 
 def _considered(found: Discovery) -> list[Block]:
     gates = [found.numbers.number(f"accept.{gate}") for gate in ("gain", "confusable")]
-    blocks: list[Block] = []
+    blocks: list[Block] = [*before_screening(found.search)]
     for k, one in enumerate(found.search.rounds, start=1):
         blocks.append(gain_figure(one, k, *gates))
         rows = [

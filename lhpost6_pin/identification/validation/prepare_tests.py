@@ -106,12 +106,23 @@ def total_wrench(plant: Plant, motion: PlatenMotion, force: Array) -> Array:
 
 
 def wrench_calibration(test: PreparedTest) -> Array:
-    """Standard deviation (6,) of the measured wrench's mean at C by gains and offsets of force sensors; nan without."""
-    sensors, force = test.basis.sensors, test.test.channels.get("actuator_force")
-    if force is None:
+    """Standard deviation (6,) of the measured wrench's mean at C by gains and offsets of the sensors of force.
+
+    Those are load cells, else the pressures whose force it is, over their areas; nan without any.
+    """
+    sensors, channels, actuators = test.basis.sensors, test.test.channels, test.plant.machine.actuators
+    ways = (("actuator_force",), ("chamber_pressure_a", "chamber_pressure_b"), ("pressure_difference",))
+    used = next((way for way in ways if way[0] in channels), ())  # as `actuator_forces` prefers them
+    if not used:
         return np.full(6, np.nan)
-    mean = force.mean(axis=0)
-    sd = np.hypot(sensors.offset_sd("actuator_force"), sensors.gain_sd("actuator_force") * mean)
+    square = np.zeros(len(actuators))
+    for side, name in enumerate(used):
+        for k, actuator in enumerate(actuators):
+            area = 1.0 if name == "actuator_force" else (actuator.area_a, actuator.area_b)[side]
+            if area is not None:  # a single-acting one has no chamber B; columns of B are those that have
+                column = k if side == 0 else test.plant.machine.double_acting.index(actuator.name)
+                mean = float(channels[name][:, column].mean())
+                square[k] += area**2 * (sensors.offset_sd(name) ** 2 + (sensors.gain_sd(name) * mean) ** 2)
     rest = plant_motion(test.plant, PlatenMotion(*np.zeros((3, 1, 6))))
-    arms = leg_wrenches(test.plant, rest.q, np.ones((1, len(mean))))[0]
-    return np.asarray(np.sqrt((arms**2).T @ sd**2))
+    arms = leg_wrenches(test.plant, rest.q, np.ones((1, len(actuators))))[0]
+    return np.asarray(np.sqrt((arms**2).T @ square))

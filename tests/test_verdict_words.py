@@ -5,18 +5,32 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
+from doc_pages import PAGES
 from page_cases import numbers
 
+from lhpost6_pin.data.summary import summarise_records
 from lhpost6_pin.discovery.balances import Balance
+from lhpost6_pin.discovery.demonstration import earthquake
 from lhpost6_pin.discovery.discover import _sourced, discovery_numbers
 from lhpost6_pin.discovery.effect_loops import squares_explained
 from lhpost6_pin.discovery.finding import EffectFinding
 from lhpost6_pin.discovery.held_out import Gap, GapTraces
 from lhpost6_pin.discovery.verdict import Verdict
 from lhpost6_pin.discovery.verdict_file import summary
-from lhpost6_pin.discovery.verdict_notes import balance_note, before_screening, floor_note, interval_note, refit_summary
+from lhpost6_pin.discovery.verdict_notes import (
+    balance_note,
+    before_screening,
+    floor_note,
+    form_note,
+    interval_note,
+    refit_summary,
+)
 from lhpost6_pin.identification.calibration.free_parameters import machine_parameters, with_parameters
+from lhpost6_pin.machine.library import find_family
 from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.show.check_tables import campaign_entries
 from lhpost6_pin.show.report.closing_plots import _percent, _trace_figure
 from lhpost6_pin.show.report.discover_plots import gap_figure, held_out_errors
 from lhpost6_pin.show.report.discover_report import (
@@ -26,6 +40,7 @@ from lhpost6_pin.show.report.discover_report import (
     _verdict_of,
     verdict_sentence,
 )
+from lhpost6_pin.simulation.simulated_campaign import _moves
 
 NUMBERS, CALIBRATION = discovery_numbers()
 
@@ -175,3 +190,40 @@ def test_an_effect_added_before_the_screening_is_listed_with_the_rounds():
     screened = SimpleNamespace(candidate=one.candidate, gain=9.0, forms=(), from_lengths=0.0)
     (words,) = before_screening(SimpleNamespace(added=(one, screened)))
     assert "backlash on AX" in words and "308" in words and "stribeck_friction" in words
+
+
+def test_a_form_that_every_fit_frees_is_explained_where_its_number_is_listed():
+    """presliding_AX.share stood among the recalibrated parameters, and nowhere what it is."""
+    entries = {"presliding_AX": SimpleNamespace(family="presliding")}
+    machine = SimpleNamespace(parameters=SimpleNamespace(effects=entries))
+    changed = {"presliding_AX.share": None, "drive.viscous": None}
+    words = form_note(SimpleNamespace(verdict=SimpleNamespace(changed=changed), fitted=machine))
+    assert "presliding_AX: seal friction" in words and "share" in words and "Dahl" in words
+    assert form_note(SimpleNamespace(verdict=SimpleNamespace(changed={"drive.viscous": None}), fitted=machine)) == ""
+
+
+@pytest.mark.parametrize("name", ["backlash", "backlash_before_friction", "presliding", "bearing_presliding"])
+def test_an_equation_has_the_names_that_the_table_beside_it_has(name):
+    family = find_family(name)
+    assert all(shape.name in family.equation for shape in family.shapes)
+
+
+def test_the_demonstration_says_which_part_of_the_earthquake_it_runs():
+    """It was half of an earthquake in words, and its first 12 s at half its size in truth: less than 0.035 g."""
+    seconds, scale = earthquake()
+    target = make_target(find_motion("ridgecrest-ccc"), scale=scale)
+    part = target.time <= seconds
+    assert (
+        0.025 < np.abs(target.acceleration[part]).max() / 9.81 < 0.035 < 0.1 < np.abs(target.acceleration).max() / 9.81
+    )
+    words = (PAGES / "start.md").read_text(encoding="utf-8")
+    assert f"the first {seconds:g} s of a real earthquake" in words and "half of a real" not in words
+
+
+def test_a_simulated_test_that_ends_in_motion_says_so():
+    """A real one should end in a rest; a motion of two seconds is cut in its middle, or runs to its end."""
+    target = make_target(find_motion("sine", amplitude=0.01, cycles=2), axes="x")
+    assert _moves(target, len(target.time) // 2 - 7) and not _moves(target, len(target.time) - 1)
+    record = xr.Dataset({"platen_displacement": (("time", "axis"), np.zeros((9, 6)))}, {"time": np.arange(9) / 512.0})
+    (summary_of,) = summarise_records([record.assign_attrs(test="EQ", cut="ends in motion: the first 25 s of 50 s")])
+    assert campaign_entries([summary_of])["summary"]["EQ"]["cut"] == "ends in motion: the first 25 s of 50 s"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..machine.library import find_family
 from .balances import Balance
 from .estimates import deviations
 from .held_out import Gap
@@ -19,6 +20,7 @@ __all__ = [
     "balance_note",
     "before_screening",
     "floor_note",
+    "form_note",
     "interval_note",
     "open_share",
     "open_summary",
@@ -125,6 +127,17 @@ def before_screening(search: Search) -> list[str]:
             "effects to the model with it, so that they do not show its gain."
         )
     return out
+
+
+def form_note(found: "Discovery") -> str:
+    """Equations of the forms that every fit frees, whose numbers are among those recalibrated; empty without any."""
+    names = dict.fromkeys(name.rpartition(".")[0] for name in found.verdict.changed)
+    entries = found.fitted.parameters.effects
+    of = {name: find_family(entries[name].family) for name in names if name in entries}
+    own = [
+        f"{name}: {family.title}, {family.equation}." for name, family in of.items() if family.search == "background"
+    ]
+    return " ".join(["Freed in every fit, and no missing effects:", *own]) if own else ""
 
 
 def balance_note(balances: Sequence[Balance]) -> str:

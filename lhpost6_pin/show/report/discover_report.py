@@ -17,6 +17,7 @@ from ...discovery.verdict_notes import (
     balance_note,
     before_screening,
     floor_note,
+    form_note,
     interval_note,
     open_share,
 )
@@ -120,7 +121,7 @@ def discovery_tables(found: Discovery) -> list[Table | str]:
     balances = [_balance_table(found.balances)] if found.balances else []
     words = [balance_note(found.balances)] if found.balances else []
     effects = list(map(_effect_table, verdict.effects))
-    narrow = [interval_note(found)] if effects or changed else []
+    narrow = [interval_note(found), form_note(found)] if effects or changed else []
     return [*effects, *changed, *narrow, *sensors, *proof, floor_note(found), *balances, *words]
 
 
@@ -315,7 +316,7 @@ def _considered(found: Discovery) -> list[Block]:
 
 def _parameter_blocks(found: Discovery) -> list[Block]:
     changed, sensors = found.verdict.changed, found.verdict.sensors
-    narrow = filter(None, [interval_note(found)] if changed else [])
+    narrow = filter(None, [interval_note(found), form_note(found)] if changed else [])
     return [
         _changed_table(found.verdict) if changed else "No parameter differs.",
         *narrow,

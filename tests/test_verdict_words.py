@@ -174,7 +174,7 @@ def test_what_a_refit_explains_a_fall_of_the_error_by_is_stated(monkeypatch):
     )
     found.search.solution = SimpleNamespace(x=np.array([0.0, 0.05, 1e-9]))
     monkeypatch.setattr("lhpost6_pin.discovery.verdict_notes.deviations", lambda search: np.full(3, 1e-3))
-    assert "20.3 to 1.06 times sensor noise) by errors of sensors within their ranges, foremost gain force." in (
+    assert "20.3 to 1.06 times sensor noise) by errors of sensors within their ranges (foremost gain force)." in (
         refit_summary(found)
     )
     assert refit_summary(identified(Gap("inverse dynamics", "EQ", 1.3, 1.0, 1.0, 1.0), word="none")) == ""

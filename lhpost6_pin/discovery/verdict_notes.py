@@ -82,8 +82,11 @@ def refit_summary(found: "Discovery") -> str:
     gap = max(gaps, key=lambda one: one.delivered / one.refitted)
     sizes = f"{gap.delivered:.3g} to {gap.refitted:.3g} times sensor noise"
     errors = _sensor_errors(found.search)
-    by = f"errors of sensors within their ranges, foremost {', '.join(errors[:LISTED])}" if errors else "parameters"
-    return f" A refit lowers the held-out error ({gap.phase}, {gap.test}: {sizes}) by {by}."
+    within = "" if found.verdict.sensors else " within their ranges"
+    by = [f"errors of sensors{within} (foremost {', '.join(errors[:LISTED])})"] if errors else []
+    by += ["the parameters that differ"] if found.verdict.changed else []
+    causes = " and ".join(by) or "small changes of many parameters"
+    return f" A refit lowers the held-out error ({gap.phase}, {gap.test}: {sizes}) by {causes}."
 
 
 def _sensor_errors(found: Search) -> list[str]:

@@ -23,6 +23,7 @@ from lhpost6_pin.identification.calibration.override import save_override
 from lhpost6_pin.identification.calibration.result import (
     changed_parameters,
     contradictions,
+    far,
     out_of_range,
     verdict_on,
 )
@@ -136,6 +137,25 @@ def test_a_parameter_is_at_its_bound_where_no_machine_could_be_built_beyond(foun
         assert verdict_on(replace(found, parameters=parameters, estimate=estimate), 1) == verdict
     far = np.where(np.arange(7) == 1, -found.numbers.number("fit.reach") * found.prior, found.estimate)
     assert verdict_on(replace(found, estimate=far), 1) == "at its bound"  # it went as far as it may
+
+
+def test_a_parameter_of_which_nothing_is_known_has_not_changed(found):
+    """Three deviations off while its deviation is 0.99 of the prior's: 4 differed, and 3 were identifiable."""
+    i = found.names.index("vertical.seal_shape")
+    moved = replace(found, estimate=np.where(np.arange(7) == i, -3.5 * found.sd, found.estimate))
+    assert not moved.informed[i] and abs(far(moved)[i]) > found.limit
+    assert verdict_on(moved, i) == "not informed"
+    assert i not in changed_parameters(moved)
+
+
+def test_a_number_at_its_bound_is_not_written_as_calibrated(found, tmp_path):
+    leakage = replace(found.parameters[1], lowest=-0.1)
+    parameters = (found.parameters[0], leakage, *found.parameters[2:])
+    stopped = replace(found, parameters=parameters, estimate=np.where(np.arange(7) == 1, -0.1, found.estimate))
+    written = load_machine("lhpost6", save_override(stopped, tmp_path / "o.toml")).parameters
+    assert written[leakage.name].evidence == "at_bound"
+    assert written[leakage.name].source.startswith("at the bound of its range, no estimate; calibrated from")
+    assert written["platen.mass"].evidence == "calibrated"
 
 
 def test_a_stroke_that_gives_way_to_a_chamber_is_said_and_not_passed_off_as_measured(found, tmp_path, capsys):

@@ -331,7 +331,7 @@ def test_families_that_friction_of_another_form_passes_for_must_gain_more():
     spring, rubs = find_family("stray_spring"), find_family("stribeck_friction")
     assert (spring.confusable, rubs.confusable) == (False, True)
     assert [refusal([spring], one, less, numbers) for less in (clear, doubtful, weak)] == ["", "", ""]
-    words = ["", "within the uncertainty of the noise", "does not lower the residual"]
+    words = ["", "within the uncertainty of the expected scatter", "does not lower the residual"]
     assert [refusal([rubs], one, less, numbers) for less in (clear, doubtful, weak)] == words
     by_chance = replace(one, held_out=np.array([30.0, 20.0, -7.0]))
     against = replace(one, held_out=np.array([40.0, 20.0, -17.0]))
@@ -344,7 +344,9 @@ def test_families_confused_with_a_rival_contest_on_its_components_though_refused
     stop, beside = scored("end_stop_stiffening", ("H2",), 150.0), scored("stray_spring", ("H1",), 120.0)
     rivals = [stop, beside]
     refused = [
-        replace(scored(family, components, gain), refused="explains too little of the residual beyond noise")
+        replace(
+            scored(family, components, gain), refused="explains too little of the residual beyond the expected scatter"
+        )
         for family, components, gain in (
             ("stray_spring", ("H2",), 200.0),
             ("stray_spring", ("H3",), 300.0),  # of no rival's components
@@ -429,7 +431,7 @@ def test_what_parameters_at_their_bounds_have_absorbed_need_not_be_beyond_noise(
     numbers = load_parameters(models_folder() / "procedures" / "discovery.toml")
     one, rubs = Score(60.0, np.zeros(1), np.ones(1), np.full(3, 20.0), np.zeros(1)), find_family("bearing_friction")
     little = Lowered(60.0, 10.0, 1.0, 0.001)
-    assert refusal([rubs], one, little, numbers) == "within the uncertainty of the noise"
+    assert refusal([rubs], one, little, numbers) == "within the uncertainty of the expected scatter"
     assert refusal([rubs], one, little, numbers, absorbed=True) == ""
     search = found.search
     free = {e.components for e in absorbing(search)}

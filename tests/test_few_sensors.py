@@ -23,8 +23,10 @@ from lhpost6_pin.identification.calibration.free_parameters import machine_param
 from lhpost6_pin.identification.calibration.whitened_residuals import Whitener
 from lhpost6_pin.identification.decompose.record import decompose_test
 from lhpost6_pin.identification.friction_march import made_fine, refined, thinned
+from lhpost6_pin.identification.known_slip import slip_summary
 from lhpost6_pin.identification.prepare import MeasuredTest, chamber_pressures
 from lhpost6_pin.identification.residuals import evaluate_residuals, follow, oil_balance
+from lhpost6_pin.identification.validation.prepare_tests import wrench_calibration
 from lhpost6_pin.machine.library import families, scaled_families
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.plant import make_plant
@@ -139,6 +141,34 @@ def test_where_noise_shakes_presliding_rests_weigh_nothing_and_slip_is_marched_f
     assert np.all(test.weight[fast] > 0.99)
     loose = made_fine(make_plant(table.with_params({"drive.seal_yield": 2e-3})), rocking(noise=1e-6))
     assert loose.weight is None and loose.substeps == 1
+
+
+def test_the_mean_of_a_force_from_a_pressure_difference_is_as_sure_as_that_sensor(table):
+    """It had no standard deviation in a validation, where a decomposition of the same record had 0.194 kN."""
+    channels = {"pressure_difference": np.full((10, 1), 2e5)}
+    spread = {"pressure_difference": (5e4, 0.01)}
+    sensors = SimpleNamespace(offset_sd=lambda name: spread[name][0], gain_sd=lambda name: spread[name][1])
+    plant = make_plant(table)
+    test = SimpleNamespace(basis=SimpleNamespace(sensors=sensors), plant=plant, test=SimpleNamespace(channels=channels))
+    wanted = table.actuators[0].area_a * np.hypot(5e4, 0.01 * 2e5)
+    assert wrench_calibration(test)[0] == pytest.approx(wanted, rel=1e-9)  # rounding: one actuator along x
+    test.test.channels = {}
+    assert np.isnan(wrench_calibration(test)).all()
+
+
+def test_the_error_of_forces_is_stated_without_the_samples_that_a_fit_leaves_out(table):
+    """What discover promises is over the rest: an error where slip is unknown is none of the promise."""
+    stiff = make_plant(table.with_params({"drive.seal_yield": 5e-6}))
+    test = rocking(noise=1e-6)
+    weight = made_fine(stiff, test).weight
+    measured, residual = np.zeros((2, test.samples, 6))
+    measured[:, 0] = 100.0 * test.motion.velocity[:, 0]
+    residual[:, 0] = 0.02 * measured[:, 0] + 50.0 * (weight == 0.0) * np.cos(np.arange(test.samples))
+    words = slip_summary(stiff, test, measured, residual, slice(None))
+    unknown = f"unknown in {100.0 * (1.0 - weight.mean()):.0f} % of the samples"
+    assert words == f"friction's slip is {unknown}, RRMSE along x in the others 2 %"
+    loose = make_plant(table.with_params({"drive.seal_yield": 2e-3}))
+    assert slip_summary(loose, test, measured, residual, slice(None)) == ""
 
 
 def test_a_fine_march_is_the_march_of_a_record_sampled_as_finely(table):

@@ -17,7 +17,7 @@ from scipy.constants import g
 
 from lhpost6_pin.core.errors import RecordError, UnknownNameError
 from lhpost6_pin.data.metrics import QUANTITIES
-from lhpost6_pin.show.report.page import Page, bar, number, render_page, text
+from lhpost6_pin.show.report.page import Page, Section, Table, bar, number, render_page, save_page, text
 from lhpost6_pin.show.report.plots import ACHIEVED, Row, Trace, envelope, time_figure
 from lhpost6_pin.show.report.run_report import RunSummary, lead_summary, write_run_report
 from lhpost6_pin.show.report.scales import SCALES, Scale, percent, scaled_number, shown_as
@@ -600,3 +600,21 @@ def test_round_off_is_shown_as_zero_and_small_quantities_are_not():
     assert percent(1.09e-14).split() == ["0", "%"] and percent(float("nan")) == "–"
     assert shown_as(2.4e-6, Scale(1e3, "mm")).startswith("0.0024")
     assert scaled_number(float("nan"), Scale(1.0, "N")) == "–"
+
+
+@pytest.mark.long
+@pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
+def test_no_column_of_a_table_is_cut_on_a_screen_of_1200_pixels(tmp_path):
+    """Nine columns of long titles, such as forms of friction: cells wrap before the last column is hidden."""
+    header = ("Test", *(f"backlash in series with friction of form {k}" for k in range(7)), "numbers fitted")
+    wide = Table("Wide", header, [("0.25Hz_1in", *(["0.968 (18.0 %)"] * 7), "12")])
+    sections = [Section("wide", "Wide", [wide])]
+    page = Page(
+        kind="Test", title="Tables", purpose="Width.", verdict="Fits.", level="good", headlines=[], sections=sections
+    )
+    path = save_page(page, tmp_path / "page.html")
+
+    async def look(tab: Tab) -> float:
+        return await tab.evaluate("(s => s.scrollWidth - s.clientWidth)(document.querySelector('#wide .scroll'))")
+
+    assert browse(tmp_path, Path(path).as_uri(), look, (1200, 800)) <= 0

@@ -83,7 +83,7 @@ def demo(
     from ..data.campaign import save_campaign
     from ..data.sensors import load_sensors
     from ..discovery import verdict_entries
-    from ..discovery.demonstration import hidden_effect, measured_tests, open_loops, searched
+    from ..discovery.demonstration import earthquake, hidden_effect, measured_tests, open_loops, searched
     from ..machine.library import find_family
     from ..machine.machine import load_machine
     from ..show.report.discover_report import save_discovery
@@ -94,13 +94,15 @@ def demo(
     folder = folder_for(out, "demo", "verdict.json", "model.toml", "report.html", "view.html")
     measured = folder / "measured"
     name, component, numbers = hidden_effect()
+    seconds, scale = earthquake()
     family = find_family(name)
     units = {shape.name: shape.unit for shape in family.shapes}
     what = ", ".join(f"{key} {value:g} {units[key]}" for key, value in numbers.items())
     echo = partial(typer.echo, err=json)
     echo(
         f"1. A table with an effect that its model lacks: {family.title} ({component}), {what}.\n"
-        "   The virtual 469D runs two short tests on it, and half of a real earthquake (Ridgecrest 2019, CCC);\n"
+        f"   The virtual 469D runs two short tests on it, and the first {seconds:g} s of a real earthquake,\n"
+        f"   before its strong part, at {scale:g} times its size (Ridgecrest 2019, CCC: at most 0.03 g);\n"
         "   sensors with noise, gains, offsets and skews record them."
     )
     with progress_bar("three tests") as progress:

@@ -18,6 +18,7 @@ class RecordSummary(NamedTuple):
     rate_hz: float
     channels: int  # columns along time
     peaks: Mapping[str, Mapping[str, float]]  # largest |platen motion| by quantity and axis, SI
+    cut: str = ""  # that a simulated test ends in motion, without the rest that a real one needs
 
 
 def summarise_records(records: Sequence[xr.Dataset]) -> tuple[RecordSummary, ...]:
@@ -34,6 +35,9 @@ def summarise_records(records: Sequence[xr.Dataset]) -> tuple[RecordSummary, ...
         count = sum(v[0].size for v in columns)
         seconds = step * (record.sizes["time"] - 1)
         found.append(
-            RecordSummary(str(record.attrs.get("test", "")), seconds, float(f"{1 / step:.6g}"), count, motions)
+            RecordSummary(
+                *(str(record.attrs.get("test", "")), seconds, float(f"{1 / step:.6g}"), count, motions),
+                cut=str(record.attrs.get("cut", "")),
+            )
         )
     return tuple(found)

@@ -141,9 +141,9 @@ def refusal(
     if absorbed:
         return ""
     if less.beyond < sum(gate(family, numbers) for family in families if family.confusable):
-        return "within the uncertainty of the noise"
+        return "within the uncertainty of the expected scatter"
     if less.share < n("accept.closure"):
-        return "explains too little of the residual beyond noise"
+        return "explains too little of the residual beyond the expected scatter"
     if less.of_first < n("accept.of_first"):
         return "explains too little of the initial residual"
     return ""

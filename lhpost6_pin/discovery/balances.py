@@ -1,8 +1,9 @@
 """Balances on held-out tests: what models leave of the measured forces and flows of tests that were not searched.
 
 Three models as in `held_out`, each with its sensor errors. Per kind of residual: the normalised RMS error in units of
-sensor noise; of the wrench also the error of its forces over the measured actuator forces, and the share R2 of their
-variance explained, over the band that is compared, without the mean.
+the expected scatter (sensor noise, and what the form of friction and the oil's temperature leave open); of the wrench
+also the error of its forces over the measured actuator forces, and the share R2 of their variance explained, over the
+band that is compared, without the mean.
 """
 
 from collections.abc import Sequence
@@ -26,9 +27,10 @@ class Balance:
 
     kind: str
     test: str
-    error: tuple[float, float, float]  # normalised RMS, 1 is sensor noise
+    error: tuple[float, float, float]  # normalised RMS, 1 is the expected scatter
     share: tuple[float, float, float] | None = None  # RMS error over RMS measured, of the wrench
     explained: tuple[float, float, float] | None = None  # R2 of the wrench
+    slip_known: float = 1.0  # share of the test that the wrench is compared in: where friction's slip is known
 
 
 class HeldOut(NamedTuple):
@@ -58,10 +60,12 @@ def evaluate_balances(held: Problem, three: Sequence[HeldOut]) -> tuple[Balance,
             if not rows.any():
                 continue
             error = [float(np.sqrt(np.mean(np.abs(one.whitened[t][:, rows]) ** 2))) for one in three]
-            share = explained = None
+            share, explained, known = None, None, 1.0
             if kind == "wrench" and (left := _left(held, three, t, forces)) is not None:
                 share, explained = _three(np.sqrt(left)), _three(1.0 - left)
-            found.append(Balance(kind, test.name, _three(np.array(error)), share, explained))
+            if kind == "wrench" and test.weight is not None:
+                known = float(test.weight.mean())
+            found.append(Balance(kind, test.name, _three(np.array(error)), share, explained, known))
     return tuple(found)
 
 

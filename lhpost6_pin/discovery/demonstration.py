@@ -18,7 +18,7 @@ from ..simulation.rehearse import replay
 from ..simulation.simulated_campaign import load_procedure, simulate_campaign
 from .discover import discover
 
-__all__ = ["EARTHQUAKE", "OpenLoops", "hidden_effect", "measured_tests", "open_loops", "searched"]
+__all__ = ["EARTHQUAKE", "OpenLoops", "earthquake", "hidden_effect", "measured_tests", "open_loops", "searched"]
 
 PROCEDURE = "demo"
 EARTHQUAKE = "EQ"
@@ -43,6 +43,12 @@ def hidden_effect() -> tuple[str, str, dict[str, float]]:
     known = load_procedure(PROCEDURE)
     numbers = {k.removeprefix("hidden."): known.number(k) for k in known if k.startswith("hidden.")}
     return str(known.words["hidden.family"]), str(known.words["hidden.component"]), numbers
+
+
+def earthquake() -> tuple[float, float]:
+    """Length of the earthquake [s], from its beginning, and its scale."""
+    known = load_procedure(PROCEDURE)
+    return known.number(f"{EARTHQUAKE}.seconds"), known.number(f"{EARTHQUAKE}.scale")
 
 
 def measured_tests(machine: Machine, sensors: SensorSet, *, seed: int, progress: Progress | None = None) -> Campaign:

@@ -24,13 +24,13 @@ from ..identification.calibration.prepare import prepare_problem
 from ..identification.calibration.problem import Problem
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
-from ..machine.parameters import Parameters, load_parameters
+from ..machine.parameters import Parameters, Quantity, load_parameters
 from ..mechanics.plant import make_plant
 from .balances import Balance, evaluate_balances, residual_at
 from .candidates import with_background, with_other_form, with_warm_oil
 from .checkpoint import SearchCheckpoint, make_checkpoint
 from .effect_loops import EffectLoop, effect_loops
-from .estimates import deviations, estimates_of
+from .estimates import at_bounds, deviations, estimates_of
 from .friction_form import with_friction_form
 from .held_out import Proof, prove
 from .lost_motion import LostMotion, lost_motion, with_lost_motion, with_rod_lengths
@@ -146,11 +146,11 @@ def discover(
     bases = [residual_at(one, found.solution).base for one in tests_of_search] if found.added else []
     function = verdict.residual_function
     final = found.refit if any(function is one for one in replacing) else found.solution
-    fitted = fitted_machine(final)
+    fitted = fitted_machine(final) if function is None else with_residual_function(fitted_machine(final), function)
     return Discovery(
         campaign=campaign.name,
         machine=machine,
-        fitted=_sourced(fitted if function is None else with_residual_function(fitted, function), machine, campaign),
+        fitted=_sourced(fitted, replace(found, solution=final), machine, campaign),
         used=tuple(name for name in names if name not in proven),
         held_out=proven,
         skipped=campaign.skipped,
@@ -213,20 +213,33 @@ def _balances_and_forces(found: Search, held: Problem | None) -> tuple[tuple[Bal
     return evaluate_balances(held, three), residual_records(held, models)
 
 
-def _sourced(fitted: Machine, delivered: Machine, campaign: Campaign) -> Machine:
-    """The fitted machine with the campaign as the source of every number that differs from the one delivered."""
+def _sourced(fitted: Machine, found: Search, delivered: Machine, campaign: Campaign) -> Machine:
+    """The fitted machine with the campaign as the source of every number that differs from the one delivered.
+
+    Numbers at the bound of their range are no estimates, and say so.
+    """
     source = f"fitted to campaign {campaign.name} by lhpost6 discover"
+    bounded = set(at_bounds(found))
+    stopped = {path for p in found.problem.parameters if p.name in bounded for path, _ in p.paths}
+
+    def known(quantity: Quantity, at_bound: bool, was: str = "") -> Quantity:
+        if at_bound:
+            return replace(
+                quantity, evidence="at_bound", source=f"at the bound of its range, no estimate; {source}{was}"
+            )
+        return replace(quantity, evidence="calibrated", source=source + was)
+
     parameters = fitted.parameters
     quantities = dict(parameters.quantities)
     for path, quantity in quantities.items():
         stated = delivered.parameters.quantities.get(path)
         if stated is None or stated.value != quantity.value:
             was = f"; was {stated.value} ({stated.source})" if stated else ""
-            quantities[path] = replace(quantity, evidence="calibrated", source=source + was)
+            quantities[path] = known(quantity, path in stopped, was)
     effects = {}
     for name, entry in parameters.effects.items():
         if entry != delivered.parameters.effects.get(name):
-            own = {key: replace(q, evidence="calibrated", source=source) for key, q in entry.values.items()}
+            own = {key: known(q, f"{name}.{key}" in bounded) for key, q in entry.values.items()}
             entry = replace(entry, values=own)
         effects[name] = entry
     return replace(fitted, parameters=replace(parameters, quantities=quantities, effects=effects))

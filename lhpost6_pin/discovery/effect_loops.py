@@ -24,7 +24,7 @@ from ..mechanics.pose import kinematic_jacobian, leg_displacements
 from .estimates import Estimate, amplitude_of
 from .search_state import AddedEffect, Search
 
-__all__ = ["EffectLoop", "effect_loops"]
+__all__ = ["EffectLoop", "effect_loops", "squares_explained"]
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class EffectLoop:
     after: Array  # (n,) with it
     own: Array  # (n,) difference
     spread: tuple[float, float]  # of `own`, as factors: the amplitude's interval
-    explained: float  # share of the variance of `before`
+    explained: float  # share of the squares of `before`, `squares_explained`
 
 
 def effect_loops(
@@ -85,11 +85,22 @@ def _loops(
         own, rest = (low_pass.apply(x, test.dt) for x in (column.own, column.rest))
         over, over_unit, state = _state(base, one.candidate.family.over, test, column.place, path)
         whole = own + rest
-        left = float(np.var(rest) / np.var(whole)) if np.var(whole) > 0.0 else 0.0
         yield EffectLoop(
             *(one.candidate.family.named, test.name, column.name, column.unit, over, over_unit, state),
-            before=whole, after=rest, own=own, spread=spread, explained=1.0 - left,
+            before=whole, after=rest, own=own, spread=spread,
+            explained=squares_explained(whole, rest),
         )  # fmt: skip
+
+
+def squares_explained(before: Array, after: Array) -> float:
+    """Share of the squares of a residual (n,) that an effect explains; zero where there is nothing to explain.
+
+    A constant part of the effect counts, as a null bias has no other. The constant residual that remains with the
+    effect, such as a static preload, is no error of its form and is left out of both.
+    """
+    level = float(after.mean())
+    squares = float(np.mean((before - level) ** 2))
+    return 1.0 - float(np.var(after)) / squares if squares > 0.0 else 0.0
 
 
 class _Column(NamedTuple):

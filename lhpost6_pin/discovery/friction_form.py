@@ -65,7 +65,9 @@ def with_friction_form(found: Search, held: Problem | None, progress: Progress) 
         return found, held
     contest = (FittedCandidate(candidate, 0.0, fitted_machine(after.solution)),)
     fall = squares_by_column(before.residual) - squares_by_column(after.residual)
-    added = AddedEffect(candidate, gain, 0, len(forms.forms), contest, fall, 0.0)
+    compared = filter(None, map(effect_of_form, forms.forms))
+    named = tuple(dict.fromkeys(find_family(name).named for name, *_ in compared))
+    added = AddedEffect(candidate, gain, 0, len(forms.forms), contest, fall, 0.0, forms=named)
     if held is not None:
         held = held.scaled(_floor(held, residual_at(held, after.solution).whitened, share))
     return after.with_effect(added), held

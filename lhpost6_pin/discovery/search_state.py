@@ -64,6 +64,7 @@ class AddedEffect:
     fall: Array  # (c,) of the sum of squared residuals, by column
     apart: float  # log-likelihood within which two families explain the campaign equally well
     from_lengths: float = 0.0  # log-likelihood of length sensors, which are not among the residuals
+    forms: tuple[str, ...] = ()  # families that were compared with it as forms of friction, before any screening
 
     @property
     def rivals(self) -> tuple[FittedCandidate, ...]:

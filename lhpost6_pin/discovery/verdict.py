@@ -125,6 +125,8 @@ def judge(
         word = "ambiguous" if any(e.rivals for e in effects) else "named"
     elif sensors:
         word = "sensor"
+    tested = {family for one in found.added for family in (one.candidate.family.named, *one.forms)}
+    hidden = tuple(name for name in hidden if name not in tested)  # by a fit of its own, whatever a screening shows
     spots = tuple(worst_spots(problem, left.residual)) if unexplained else ()
     kept_own = tuple(f"{one.candidate.name}." for one in found.added if one.candidate.name not in gone)
     listed = changed | {name: estimate for name, estimate in estimates.items() if name.startswith(kept_own)}

@@ -21,6 +21,7 @@ from .floor import NOISE
 from .search_state import Round
 from .unexplained import forces_explained
 from .verdict import SensorFinding
+from .verdict_notes import before_screening, interval_note, open_summary, refit_summary
 from .withdrawal import Why
 
 __all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "where"]
@@ -38,7 +39,7 @@ CONSIDERED = 1.0
 """Gain of log-likelihood from which a candidate is listed."""
 
 REMAINS = 0.01
-"""Share of the squares beyond noise from which what remains is stated."""
+"""Share of the squares beyond the expected scatter from which what remains is stated."""
 
 WORSE = 1.05
 """Normalised RMS error on a held-out test over that before, from which it counts as worse."""
@@ -94,6 +95,8 @@ def verdict_entries(found: Discovery) -> dict[str, Any]:
         "not_testable": list(verdict.untestable),
         "at_bound": list(verdict.bounded),
         "remainder": dict(found.verdict.remainder),
+        "intervals_too_narrow": bool(interval_note(found)),
+        "before_screening": before_screening(found.search),
         "considered": [_considered(one) for one in found.search.rounds],
         "withdrawn": [
             {"name": w.name, "family": w.family, "why": w.why, "numbers": list(w.numbers), "gain": _known(w.gain)}
@@ -209,7 +212,10 @@ def summary(found: Discovery) -> str:
         text += f" {beyond[0].upper()}{beyond[1:]}."
     if verdict.word in ("named", "ambiguous"):
         left = [f"{100.0 * share:.2g} % ({kind})" for kind, share in verdict.remainder.items() if share > REMAINS]
-        text += f" Of the squares beyond noise remain {', '.join(left)}." if left else ""
+        text += f" Of the squares beyond the expected scatter remain {', '.join(left)}." if left else ""
+        text += open_summary(found)
+    if verdict.word in ("none", "parameters_only", "sensor"):
+        text += refit_summary(found)
     identified = {one.family for one in verdict.effects}
     for why, reason in _WITHDRAWN.items():
         gone = dict.fromkeys(one.family for one in verdict.withdrawn if one.why == why)
@@ -268,20 +274,20 @@ def _worse(found: Discovery) -> str | None:
 
 
 def _scatter(found: Discovery) -> str | None:
-    """That forces exceed sensor noise, but are explained well enough for friction; None where they do not."""
+    """That forces exceed the expected scatter, but are explained well enough for friction; None where they do not."""
     n, misfit = found.numbers.number, found.search.misfit("wrench")
     if not (misfit > n("verdict.unexplained") and forces_explained(found.search)):
         return None
     share = np.sqrt(found.search.calibration.number("friction.enough"))
     return (
-        f"The residual of forces is {np.sqrt(misfit):.3g} times sensor noise, but within {100.0 * share:g} % of the "
-        "forces, as friction varies from stroke to stroke."
+        f"The residual of forces is {np.sqrt(misfit):.3g} times the expected scatter, but within {100.0 * share:g} % "
+        "of the forces, as friction varies from stroke to stroke."
     )
 
 
 def _unexplained_summary(found: Discovery, effects: str) -> str:
     verdict = found.verdict
-    function, place = verdict.residual_function, "the residual exceeds noise"
+    function, place = verdict.residual_function, "the residual exceeds the expected scatter"
     if function is not None:
         place = f"an effect acts on {where(function.components)}, as a function of {function.description}"
     elif drifting := [s.name.partition(" ")[2] for s in verdict.sensors if s.name.startswith("drift ")]:

@@ -13,8 +13,12 @@ __all__ += ["vector_length"]
 
 Value: TypeAlias = float | tuple[float, ...]
 
-EVIDENCE = ("report", "measured", "derived", "drawn", "assumed", "standard", "numerical", "calibrated", "override")
-"""How well a number is known, strongest claim first; `override` is what a user set by hand."""
+EVIDENCE = (
+    *("report", "measured", "derived", "drawn", "assumed", "standard"),
+    *("numerical", "calibrated", "at_bound", "override"),
+)
+"""How well a number is known, strongest claim first; `at_bound` is where a fit ended at the bound of a number's range,
+which is no estimate; `override` is what a user set by hand."""
 
 LARGEST = 1e30
 """No quantity of a machine or a test in SI is larger, and the powers of this one can still be computed with."""

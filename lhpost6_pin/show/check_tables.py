@@ -69,4 +69,5 @@ def print_tests(tests: Sequence[RecordSummary]) -> None:
             row.append(f"{moved[axis]:.3g} {axis}" if axis else "")
         rows.append(row)
     header = ("test", "seconds", "Hz", "channels", *(f"peak {label}" for *_, label in wanted))
-    print_blocks(Table("Tests, with the measured peaks of the platen's motion and their axes", header, rows))
+    cut = (f"{one.test} {one.cut}; record a real test to a rest after its motion" for one in tests if one.cut)
+    print_blocks(Table("Tests, with the measured peaks of the platen's motion and their axes", header, rows), *cut)

@@ -10,6 +10,7 @@ from ..identification.calibration.calibration_summary import (
     cut_strokes,
     delay_summary,
     friction_summary,
+    interval_summary,
     range_summary,
 )
 from ..identification.calibration.scale import scale_summary
@@ -71,6 +72,7 @@ def print_calibration(calibration: Calibration) -> None:
     off, friction = sensor_table(calibration), friction_table(calibration)
     print_blocks(
         parameter_table(calibration),
+        interval_summary(calibration),
         off,
         f"{len(off.rows)} of {len(calibration.unknowns)} sensor errors are significant, {range_summary(calibration)}",
         delay_summary(calibration),
@@ -90,7 +92,7 @@ def print_agreement(found: Decomposed, agreement: WrenchAgreement) -> None:
     """Print a specimen's interface wrench, the residual with its expected size, and errors of the modelled forces."""
     how = f"Modelled against measured forces up to {found.comparison.band.high:g} Hz"
     interface = [] if agreement.interface is None else [interface_table(agreement.interface)]
-    print_blocks(*interface, how, *residual_tables(found, agreement), *match_tables(found, agreement))
+    print_blocks(*interface, how, *residual_tables(found, agreement), *match_tables(found, agreement), found.slip)
 
 
 def print_discovery(found: Discovery) -> None:

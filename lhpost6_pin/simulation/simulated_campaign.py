@@ -32,6 +32,9 @@ from .trouble import with_pressure_trouble
 
 __all__ = ["SensorErrors", "as_sensed", "draw_errors", "load_procedure", "simulate_campaign", "tests_of"]
 
+AT_REST = 1e-3
+"""Share of a target's largest velocity up to which it counts as at rest."""
+
 
 class SensorErrors(NamedTuple):
     """measured(t) = (1 + gain) true(t - delay) + offset: gain and offset by channel (columns,), delay [s] by group."""
@@ -86,6 +89,8 @@ def simulate_campaign(
             "controller": settings.name,
             "motion": str(numbers.words[f"{test}.motion"]),
         }
+        if samples < len(target.time) and _moves(target, samples - 1):
+            facts["cut"] = f"ends in motion: the first {samples / SAMPLE_RATE:g} s of {target.time[-1]:.3g} s"
         record = record_of_run(with_pressure_trouble(run), facts, motion)
         if machine.accelerometers:  # they are what is measured
             record = record.drop_vars("platen_acceleration")
@@ -96,6 +101,12 @@ def simulate_campaign(
         if progress is not None:
             progress((i + 1) / len(chosen))
     return Campaign(name, tuple(records))
+
+
+def _moves(target: Target, sample: int) -> bool:
+    """Whether a target moves at a sample: a simulated test that ends there has no rest after it."""
+    speed = np.abs(target.velocity)
+    return bool(np.any(speed[sample] > AT_REST * speed.max(axis=0)))
 
 
 def load_procedure(name: str) -> Parameters:

@@ -6,7 +6,7 @@ from .free_parameters import parameter_changes
 from .result import Calibration, contradictions, out_of_range, stated_range
 
 __all__ = ["chance", "contradiction_summary", "convergence_summary", "correlation_summary", "cut_strokes"]
-__all__ += ["delay_summary", "friction_summary", "lacking", "range_summary"]
+__all__ += ["delay_summary", "friction_summary", "interval_summary", "lacking", "range_summary"]
 
 
 def cut_strokes(calibration: Calibration) -> list[str]:
@@ -46,6 +46,17 @@ def delay_summary(calibration: Calibration) -> str:
 def lacking(calibration: Calibration) -> bool:
     """Whether these tests show more than noise that the calibrated model does not explain."""
     return bool(np.nanmax(calibration.misfit_after) > calibration.noise_alone)
+
+
+def interval_summary(calibration: Calibration) -> str:
+    """That intervals are too narrow where misfit is left; empty elsewhere."""
+    if not (calibration.converged and lacking(calibration)):
+        return ""
+    largest = float(np.nanmax(calibration.misfit_after))
+    return (
+        f"Intervals allow for sensor noise, not for errors of the model: misfit is left (mean square {largest:.3g} at "
+        "most, 1 is sensor noise), so that they are too narrow."
+    )
 
 
 def convergence_summary(calibration: Calibration) -> str:

@@ -7,7 +7,7 @@ from ...core.files import write_whole
 from ...machine.machine_toml import quantity_toml, section_of, sections_toml
 from ...machine.parameters import Quantity
 from .free_parameters import parameter_changes
-from .result import Calibration
+from .result import Calibration, verdict_on
 
 __all__ = ["save_override"]
 
@@ -22,8 +22,11 @@ def save_override(calibration: Calibration, path: Path) -> Path:
     machine, count = calibration.machine, len(calibration.parameters)
     values = parameter_changes(machine, calibration.parameters, calibration.estimate[:count])
     deviations: dict[str, list[float]] = {}
+    stopped: set[str] = set()  # numbers at a bound, which are no estimates
     for i, parameter in enumerate(calibration.parameters):
         sd = float(calibration.sd[i]) * (1.0 if parameter.form == "shift" else parameter.value)
+        if verdict_on(calibration, i) == "at its bound":
+            stopped |= {name for name, _ in parameter.paths}
         for name, component in parameter.paths:
             stated = machine.parameters[name].sd
             known = stated if isinstance(stated, tuple) else (stated or 0.0,)
@@ -38,10 +41,14 @@ def save_override(calibration: Calibration, path: Path) -> Path:
             origin = source
             if calibration.converged:
                 spread = tuple(deviations[name]) if isinstance(value, list) else deviations[name][0]
-        number = tuple(value) if isinstance(value, list) else value
-        entries[name] = Quantity(number, machine.parameters[name].unit, "calibrated", origin, spread)
+        number, evidence = tuple(value) if isinstance(value, list) else value, "calibrated"
+        if name in stopped:
+            evidence, origin = "at_bound", f"at the bound of its range, no estimate; {origin}"
+        entries[name] = Quantity(number, machine.parameters[name].unit, evidence, origin, spread)
     for name, quantity in machine.parameters.items():
-        earlier = quantity.evidence in ("override", "calibrated") and not name.endswith(".valves")  # those of the tests
+        earlier = quantity.evidence in ("override", "calibrated", "at_bound") and not name.endswith(
+            ".valves"
+        )  # those of the tests
         if earlier and name not in entries:
             entries[name] = replace(quantity, printed=None)
     groups: dict[str, list[str]] = {}

@@ -131,17 +131,24 @@ def far(calibration: Calibration) -> Array:
 
 
 def beyond(calibration: Calibration) -> Mask:
-    """Sensor errors that differ from zero by more than the limit; parameters that do so and by a material amount."""
+    """Sensor errors that differ from zero by more than the limit; identifiable parameters that do so materially.
+
+    A parameter that is not identifiable moves with what others, or errors of the model, make of it: no finding.
+    """
+    count = len(calibration.parameters)
     material = calibration.numbers.number("report.material") * calibration.prior
-    material[len(calibration.parameters) :] = 0.0
-    return np.asarray((np.abs(far(calibration)) > calibration.limit) & (np.abs(calibration.estimate) > material))
+    material[count:] = 0.0
+    known = calibration.informed | (np.arange(len(material)) >= count)
+    return np.asarray(
+        (np.abs(far(calibration)) > calibration.limit) & (np.abs(calibration.estimate) > material) & known
+    )
 
 
 def verdict_on(calibration: Calibration, i: int) -> Verdict:
     """The verdict on unknown i; the first that holds.
 
     At its bound: at the limit set by its prior or by what can be built, but for a lowest value that is an estimate like
-    any other. Changed: `beyond`. Unchanged: identifiable and not beyond.
+    any other. Changed: `beyond`. Unchanged: identifiable and not beyond. Not informed: all others, wherever they moved.
     """
     count, prior, x = len(calibration.parameters), calibration.prior[i], calibration.estimate[i]
     reach = calibration.numbers.number("fit.reach" if i < count else "fit.sensor_reach") * prior

@@ -28,6 +28,7 @@ from ...mechanics.interface_wrench import bare
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import PlatenMotion
 from ..inverse_dynamics import Decomposition, inverse_dynamics
+from ..known_slip import UNKNOWN_SLIP, slip_summary
 from ..prepare import (
     AS_RECORDED,
     EACH_TEST,
@@ -83,6 +84,12 @@ class Decomposed(Shown):
     def dt(self) -> float:
         """Sample interval [s]."""
         return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+
+    @property
+    def slip(self) -> str:
+        """In which share of the test friction's slip is unknown, and the error in the rest; empty where it is known."""
+        words = slip_summary(self.plant, self.test, self.forces.measured, self.forces.residual, self.inside)
+        return f"{words[0].upper()}{words[1:]}. {UNKNOWN_SLIP}" if words else ""
 
     def compared(self, values: Array) -> Array:
         """Values (n, ...) at all samples, filtered and cut as `forces` are."""

@@ -80,11 +80,10 @@ def agree(pairs: Sequence[ComparedQuantity], dt: float, numbers: Numbers) -> tup
     Displacement, velocity and acceleration of an axis share the delay of the velocity, since the displacement of an
     open loop drifts. Raises ValueError if a test is too short for the longest delay sought.
     """
-    edge = round(numbers.edge / dt)
     shared: dict[str, float] = {}
     found: list[ColumnAgreement] = []
     for pair in sorted(pairs, key=lambda p: p.quantity != "velocity"):
-        part = slice(edge, len(pair.measured) - edge)
+        part = numbers.inside(len(pair.measured), dt)
         moves = _moving(pair, pair.measured[part], numbers)
         for k, column in enumerate(pair.columns):
             late = float("nan")

@@ -27,6 +27,7 @@ from ...simulation.rehearse import rehearse, replay
 from ...simulation.simulate import fastest_engine
 from ...tuning.drives import load_drive
 from ..decompose.record import decompose_test
+from ..known_slip import slip_summary
 from ..prepare import source_of
 from .phase_agreement import ColumnAgreement, ComparedQuantity, agree
 from .prepare_tests import PreparedTest, wrench_calibration
@@ -59,6 +60,7 @@ class Phase:
     resonances: tuple[Resonance, ...] = ()
     lags: tuple[Lag, ...] = ()  # of a closed loop behind its reference
     notes: tuple[str, ...] = ()
+    slip: str = ""  # in which share of inverse dynamics friction's slip is unknown, and the error in the rest
     reason: str | None = None
 
     def pair(self, quantity: str) -> ComparedQuantity | None:
@@ -84,7 +86,7 @@ def _inverse_dynamics(test: PreparedTest) -> Phase:
     numbers, axes = test.basis.numbers, test.plant.axes
     columns = tuple(AXES[k] for k in axes)
     (found, notes), (again, _) = (decompose_test(test.plant, one) for one in (test.test, test.again))
-    calibration = wrench_calibration(test)[axes]
+    calibration, inside = wrench_calibration(test)[axes], numbers.inside(test.test.samples, test.test.dt)
     pairs = []
     for quantity, *sides in _SIDES:
         values = [getattr(one, side) for one in (found, again) for side in sides]
@@ -92,11 +94,14 @@ def _inverse_dynamics(test: PreparedTest) -> Phase:
             measured, model, more, again_model = (numbers.band.apply(x[:, axes], test.test.dt) for x in values)
             sensor_noise, noise = more - measured, again_model - more - model + measured
             known = calibration if quantity == "wrench" else None
-            spread = sensor_noise.std(axis=0), noise.std(axis=0)
+            spread = sensor_noise[inside].std(axis=0), noise[inside].std(axis=0)
             pairs.append(ComparedQuantity(quantity, columns, measured, model, *spread, known))
     ours, theirs, noise = (x[:, axes] for x in (found.measured, found.required, again.measured - found.measured))
     spectrum = estimate_spectrum("wrench", columns, ours, theirs, noise, test.test.dt, numbers)
-    return Phase(1, test.test.name, test.time, tuple(pairs), agree(pairs, test.test.dt, numbers), spectrum, notes=notes)
+    ours, theirs = (numbers.band.apply(x, test.test.dt)[inside] for x in (found.measured, found.residual))
+    slip = slip_summary(found.states.plant, test.test, ours, theirs, inside)
+    agreement = agree(pairs, test.test.dt, numbers)
+    return Phase(1, test.test.name, test.time, tuple(pairs), agreement, spectrum, notes=notes, slip=slip)
 
 
 def _open_loop(test: PreparedTest) -> Phase:

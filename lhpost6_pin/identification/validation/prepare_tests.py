@@ -43,6 +43,11 @@ class Numbers(NamedTuple):
         """Number at a path of the file."""
         return self.stated.number(path)
 
+    def inside(self, samples: int, dt: float) -> slice:
+        """Samples of a test that are compared: all but its ends."""
+        edge = round(self.edge / dt)
+        return slice(edge, samples - edge)
+
     @property
     def shortest(self) -> float:
         """Length of the shortest test that can be compared [s], by the longest delay and the edges."""

@@ -125,7 +125,8 @@ class SimulatedComparison:
         if self.again is not self.ran:
             noise = self._at_samples(model[1] - model[0], band) - sensor_noise
         kept = band.apply(measured[0], self.dt)[: self.n], self._at_samples(model[0], band)
-        spread = sensor_noise.std(axis=0), noise.std(axis=0)
+        inside = self.basis.numbers.inside(self.n, self.dt)
+        spread = sensor_noise[inside].std(axis=0), noise[inside].std(axis=0)
         return ComparedQuantity(quantity, tuple(columns), *kept, *spread, calibration)
 
     def _at_samples(self, values: Array, band: Band) -> Array:

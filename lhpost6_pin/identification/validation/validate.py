@@ -177,7 +177,11 @@ def save_metrics(found: Validation, path: Path) -> None:
 def _phase(phase: Phase, found: Validation) -> dict[str, Any]:
     if phase.reason:
         return {"reason": phase.reason}
-    out: dict[str, Any] = {"seconds": float(phase.time[-1]), "notes": list(phase.notes), "agreement": {}}
+    out: dict[str, Any] = {
+        "seconds": float(phase.time[-1]),
+        "notes": [*phase.notes, *([phase.slip] if phase.slip else [])],
+        "agreement": {},
+    }
     for one in phase.agreement:
         row = {**one._asdict(), "error_to_noise": one.error_to_noise}
         out["agreement"].setdefault(row.pop("quantity"), {})[row.pop("column")] = row

@@ -121,7 +121,7 @@ def _headlines(calibration: Calibration) -> list[Headline]:
         Headline(f"{np.sum(informed[:count])} of {count}", "Identifiable parameters", note),
         Headline(f"{np.sum(outside[:count])} of {count}", "Parameters different from nominal", differ),
         Headline(f"{np.sum(outside[count:])} of {p - count}", "Significant sensor errors", ranges, trust),
-        Headline(number(after), "Largest misfit", f"1: noise alone; {number(before)} before", fits),
+        Headline(number(after), "Largest misfit", f"mean square, 1: sensor noise alone; {number(before)} before", fits),
         Headline(
             str(apart), "Contradictions", f"subset estimates against the joint one; expected by chance: {by_chance}"
         ),

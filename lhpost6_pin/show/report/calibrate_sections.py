@@ -11,6 +11,7 @@ from ...identification.calibration.calibration_summary import (
     correlation_summary,
     cut_strokes,
     delay_summary,
+    interval_summary,
     range_summary,
 )
 from ...identification.calibration.result import beyond, contradictions, far, stated_range, verdict_on
@@ -72,13 +73,15 @@ def parameter_blocks(calibration: Calibration) -> list[Block]:
     informed, material = (calibration.numbers.number(f"report.{n}") for n in ("informed", "material"))
     how = (
         "At its bound: the limit of the fit, from its prior or from an unbuildable machine. "
-        f"Changed: more than {calibration.limit:g} predicted deviations and {material:g} prior deviations from "
-        f"nominal. Unchanged: less, and identifiable (predicted deviation below {informed:g} of the prior's). Not "
-        "informed: mostly the prior. In brackets: predicted deviations from nominal. A height is the mean over the "
-        "components of its kind, which move together."
+        f"Changed: identifiable (predicted deviation below {informed:g} of the prior's), and more than "
+        f"{calibration.limit:g} predicted deviations and {material:g} prior deviations from nominal. Unchanged: "
+        "identifiable, and less. Not informed: the tests hardly narrow it, and where it moved it followed others. In "
+        "brackets: predicted deviations from nominal. A height is the mean over the components of its kind, which move "
+        "together."
     )
     tables = (parameter_table(calibration), *ratio_tables(calibration))
-    return [forest_figure(calibration), how, *tables, *cut_strokes(calibration)]
+    narrow = filter(None, [interval_summary(calibration)])
+    return [forest_figure(calibration), how, *narrow, *tables, *cut_strokes(calibration)]
 
 
 def ratio_tables(calibration: Calibration) -> list[Table]:

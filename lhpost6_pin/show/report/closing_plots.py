@@ -9,6 +9,7 @@ from ...discovery import Discovery
 from ...discovery.effect_loops import EffectLoop
 from ...discovery.held_out import GapTraces
 from ...discovery.verdict_file import title_of
+from ...identification.validation import PHASES
 from .charts import Curve, Plot, grid_figure
 from .page import Block, Figure, Table, number
 from .plots import AFTER, BEFORE, BLACK, PURPLE, TARGET, Row, Trace, time_figure
@@ -49,7 +50,9 @@ def _trace_figure(one: GapTraces, count: int) -> Figure:
     dt = float(one.time[1] - one.time[0])
     width = min(len(one.time), max(2, round(WINDOW / dt)))
     errors = one.models - one.measured[:, None]
-    errors = errors - errors.mean(axis=0)
+    from_record = one.phase != PHASES[1]  # a simulation that starts where the record does: its drift is error
+    if not from_record:
+        errors = errors - errors.mean(axis=0)
     squares = np.convolve(errors[:, 1] ** 2, np.ones(width), "valid")
     first = int(np.argmax(squares))
     scale = _scale_of(one)
@@ -58,9 +61,12 @@ def _trace_figure(one: GapTraces, count: int) -> Figure:
     styles = (DELIVERED, BEFORE, AFTER)[:count]
     values += [Trace(n, x, s) for n, x, s in zip(names, one.models.T[:count], styles, strict=True)]
     rest = [Trace(n, x, s) for n, x, s in zip(names[1:], errors.T[1:count], styles[1:], strict=True)]
-    noise = {"2 σ of noise": 2.0 * one.noise, "": -2.0 * one.noise}
+    noise = {"2 σ of sensor noise": 2.0 * one.noise, "": -2.0 * one.noise}
     what = f"{one.quantity.replace('_', ' ')}, {one.column}"
-    rows = [Row(what[0].upper() + what[1:], values, scale), Row("Error, mean removed", rest, scale, lines=noise)]
+    rows = [
+        Row(what[0].upper() + what[1:], values, scale),
+        Row("Error" if from_record else "Error, mean removed", rest, scale, lines=noise),
+    ]
     words = (
         f"{one.test}, {one.phase}: the channel in which the refitted model errs most, {WINDOW:g} s about its largest "
         "error. The test was not searched."
@@ -94,18 +100,22 @@ def _loop_figure(loops: Sequence[EffectLoop]) -> Figure:
 
 
 def _share_table(found: Discovery) -> Table:
-    """Share of the variance that each effect explains in its own column, and in every phase; and all of them there."""
-    rows = [(title_of(o.family), f"{o.column}, {o.test}", f"{100.0 * o.explained:.1f} %") for o in found.loops]
+    """Share of the squared error that each effect explains in its own column and in every phase, and all of them."""
+    rows = [(title_of(o.family), f"{o.column}, {o.test}", _percent(o.explained)) for o in found.loops]
     titles = {one.candidate.name: title_of(one.candidate.family.named) for one in found.search.added}
     every = next(iter(titles.values())) if len(titles) == 1 else "all effects"
     for gap in found.proof.gaps if found.proof else ():
         where = f"{gap.phase}, {gap.test}"
         if len(titles) > 1:
-            rows += [(titles[name], where, f"{100.0 * own:.1f} %") for name, own in gap.shares.items()]
+            rows += [(titles[name], where, _percent(own)) for name, own in gap.shares.items()]
         share = 1.0 - gap.after**2 / gap.refitted**2 if gap.refitted > 0.0 else 0.0
-        rows.append((every, where, f"{100.0 * share:.1f} % ({number(gap.refitted)} before)"))
+        rows.append((every, where, f"{_percent(share)} ({number(gap.refitted)} before)"))
     return Table(
-        "Share of the error's variance explained: by an effect against the model without it, by all against the refit",
+        "Share of the squared error explained: by an effect against the model without it, by all against the refit",
         ("Effect", "Of", "Share"),
         rows,
     )
+
+
+def _percent(share: float) -> str:
+    return f"{round(100.0 * share, 1) + 0.0:.1f} %"  # no negative zero

@@ -101,7 +101,9 @@ def _headlines(found: Decomposed, agreement: WrenchAgreement) -> list[Headline]:
     for match, what in ((agreement.actuators, "total actuator force"), (agreement.dissipative, "dissipative force")):
         worst = max(moved, key=lambda k: float(match.rrmse_varying[k]))
         note = f"{AXES[worst]}; {percent(float(match.rrmse[worst]))} including the mean"
-        label = f"Worst RRMSE of the {what} on axes that move, mean removed"
+        if len(moved) < len(found.plant.axes):
+            note += f"; of the axes that move ({', '.join(AXES[k] for k in moved)}), not those almost at rest"
+        label = f"Worst RRMSE of the {what}, mean removed"
         tiles.append(Headline(percent(float(match.rrmse_varying[worst])), label, note))
     if found.sensors is not None:
         ratio = agreement.noise_ratio
@@ -197,6 +199,7 @@ def _assumptions(found: Decomposed) -> list[Block]:
     band = found.comparison.band
     lines = [
         *found.notes,
+        *filter(None, [found.slip]),
         f"All compared signals are low-passed by one zero-phase filter (gain 1/2 at {band.high:g} Hz, order "
         f"{band.order}); {found.comparison.edge:g} s at each end are omitted. Friction states are integrated along the "
         "unfiltered motion, from rest. Power and energy are those of the unfiltered forces.",

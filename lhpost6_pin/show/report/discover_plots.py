@@ -12,6 +12,7 @@ from ...discovery.localise import gap_map
 from ...discovery.residual_function import ResidualFunction
 from ...discovery.search_state import Round
 from ...discovery.verdict_file import where
+from ...discovery.verdict_notes import EXPECTED_SCATTER
 from .layout import line_on, log_ticks, stacked_layout
 from .page import Block, Figure, Markup, Table, shaded, text
 from .plots import BLACK, BLUE, GREY, VERMILLION
@@ -38,8 +39,8 @@ def map_blocks(found: Discovery) -> list[Block]:
     problem = found.search.problem
     before, after = (gap_map(problem, rest) for rest in (found.search.refit.normal.residual, found.search.residual))
     blocks: list[Block] = [
-        "Mean square of the whitened residuals, known parameters and sensor errors refitted: 1 is sensor noise alone. "
-        "Each cell: without effects → with the identified effects."
+        "Mean square of the whitened residuals, known parameters and sensor errors refitted: 1 is the expected scatter."
+        f" {EXPECTED_SCATTER} Each cell: without effects → with the identified effects."
     ]
     for kind, words in _KINDS.items():
         pairs = [(old, new) for old, new in zip(before, after, strict=True) if old[0].kind == kind]
@@ -85,11 +86,12 @@ def gain_figure(one: Round, number: int, least: float, confusable: float) -> Fig
     return Figure(f"gains-{number}", f"Round {number}: candidate effects", words, traces, layout, layout["height"])
 
 
-def held_out_errors(found: Discovery) -> dict[str, tuple[float, float, float]]:
-    """Errors on held-out tests over noise by phase or balance and test: as delivered, refitted, with the effects."""
+def held_out_errors(found: Discovery) -> dict[tuple[str, str], tuple[float, float, float]]:
+    """Errors on held-out tests by phase or balance and test, and unit: as delivered, refitted, with the effects."""
     gaps = found.proof.gaps if found.proof else ()
-    by_phase = {f"{gap.phase}, {gap.test}": (gap.delivered, gap.refitted, gap.after) for gap in gaps}
-    return by_phase | {f"{_KINDS[one.kind].lower()}, {one.test}": one.error for one in found.balances}
+    phases = {(f"{gap.phase}, {gap.test}", "sensor noise"): (gap.delivered, gap.refitted, gap.after) for gap in gaps}
+    balances = {(f"{_KINDS[one.kind].lower()}, {one.test}", "expected scatter"): one.error for one in found.balances}
+    return phases | balances
 
 
 def gap_figure(found: Discovery) -> Figure:
@@ -97,7 +99,7 @@ def gap_figure(found: Discovery) -> Figure:
     errors = held_out_errors(found)
     series = zip(("as delivered", "refitted", "with the effects"), (GREY, VERMILLION, BLUE), strict=True)
     traces = [
-        _bar(words, color, [three[k] for three in errors.values()], range(len(errors)), "%{x:.3g} × noise")
+        _bar(words, color, [three[k] for three in errors.values()], range(len(errors)), "%{x:.3g}")
         for k, (words, color) in enumerate(series)
     ]
     floors = [gap.floor for gap in found.proof.gaps] if found.proof else []
@@ -107,11 +109,11 @@ def gap_figure(found: Discovery) -> Figure:
         | {"x": floors, "y": [row + _BELOW for row in range(len(floors))]}
     )
     most = max(max(three) for three in errors.values())
-    layout = _bars(list(errors), "Normalised RMS error (1: sensor noise)", 74, NOISE, most) | {"barmode": "group"}
+    names = [f"{name}: over {unit}" for name, unit in errors]
+    layout = _bars(names, "Normalised RMS error", 74, NOISE, most) | {"barmode": "group"}
     words = (
-        "Root mean square error over noise: of all moving channels in a phase, over that of the sensors; of each "
-        "balance, over that of the sensors and of what the form of friction leaves open. Dashed: noise alone; upright "
-        "mark: expected of a model that lacks nothing."
+        "Root mean square error: of all moving channels in a phase, over sensor noise alone; of each balance, over the "
+        f"expected scatter. {EXPECTED_SCATTER} Dashed: one; upright mark: expected of a model that lacks nothing."
     )
     return Figure("gap", "Normalised RMS error on held-out tests", words, traces, layout, layout["height"])
 

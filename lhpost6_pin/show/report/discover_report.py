@@ -12,12 +12,27 @@ from ...discovery.finding import EffectFinding
 from ...discovery.held_out import Proof
 from ...discovery.verdict import SensorFinding, Verdict, Word
 from ...discovery.verdict_file import advice, summary, title_of, where
+from ...discovery.verdict_notes import (
+    EXPECTED_SCATTER,
+    balance_note,
+    before_screening,
+    floor_note,
+    form_note,
+    interval_note,
+    open_share,
+)
 from ...machine.library import find_family
 from ...machine.machine_toml import save_machine_toml
 from .closing_plots import closing_blocks
 from .control_blocks import load_of, numbers_used
 from .curve_plots import curve_blocks
-from .discover_plots import gain_figure, gap_figure, held_out_errors, map_blocks, residual_function_figure
+from .discover_plots import (
+    gain_figure,
+    gap_figure,
+    held_out_errors,
+    map_blocks,
+    residual_function_figure,
+)
 from .page import Block, Headline, Level, Page, Section, Table, bullet_list, details, number, save_page
 
 __all__ = ["discovery_tables", "save_discovery", "verdict_sentence", "write_discover_report"]
@@ -31,6 +46,9 @@ _VERDICTS: dict[Word, tuple[str, Level]] = {
     "unexplained": ("unexplained residual", "bad"),
     "not_testable": ("not testable", "attention"),
 }
+
+PARTLY = 0.5
+"""Share of the held-out error that effects leave, from which the verdict says that they explain it in part only."""
 
 
 def save_discovery(found: Discovery, folder: Path, title: str, command: str = "") -> list[Path]:
@@ -56,7 +74,7 @@ def write_discover_report(found: Discovery, path: Path | str, command: str = "")
         title=f"Search for missing effects: {found.machine.name}, by {found.campaign}",
         purpose=f"Identify effects missing from the model of {load_of(found.machine)}, from {tests}{held}.",
         verdict=verdict_sentence(found),
-        level=_VERDICTS[found.verdict.word][1],
+        level=_verdict_of(found)[1],
         headlines=_headlines(found),
         sections=[
             Section("closing", "Error before and after", closing_blocks(found)),
@@ -73,16 +91,25 @@ def write_discover_report(found: Discovery, path: Path | str, command: str = "")
     return save_page(page, path)
 
 
+def _verdict_of(found: Discovery) -> tuple[str, Level]:
+    """The verdict in a few words, and its level; an effect that leaves most of the error is no good news alone."""
+    words, level = _VERDICTS[found.verdict.word]
+    if found.verdict.word in ("named", "ambiguous") and (left := open_share(found)) > PARTLY:
+        return f"{words}, {100.0 * left:.0f} % of the held-out error remains", "attention"
+    return words, level
+
+
 def verdict_sentence(found: Discovery) -> str:
     """Return the verdict in words, and what was identified."""
     text = summary(found)
     if text.startswith("no missing effect"):
         return text[0].upper() + text[1:]
-    return f"{_VERDICTS[found.verdict.word][0].capitalize()}: {text}"
+    words = _verdict_of(found)[0]
+    return f"{words[0].upper()}{words[1:]}: {text}"
 
 
-def discovery_tables(found: Discovery) -> list[Table]:
-    """Return the tables of a verdict: effects, recalibrated parameters, sensors, errors on held-out tests."""
+def discovery_tables(found: Discovery) -> list[Table | str]:
+    """Return the tables of a verdict: effects, recalibrated parameters, sensors, errors on held-out tests, notes."""
     verdict = found.verdict
     changed = []
     if verdict.changed:
@@ -92,7 +119,10 @@ def discovery_tables(found: Discovery) -> list[Table]:
     sensors = [_sensor_table(verdict.sensors)] if verdict.sensors else []
     proof = [_proof_table(found.proof)] if found.proof else []
     balances = [_balance_table(found.balances)] if found.balances else []
-    return [*map(_effect_table, verdict.effects), *changed, *sensors, *proof, *balances]
+    words = [balance_note(found.balances)] if found.balances else []
+    effects = list(map(_effect_table, verdict.effects))
+    narrow = [interval_note(found), form_note(found)] if effects or changed else []
+    return [*effects, *changed, *narrow, *sensors, *proof, floor_note(found), *balances, *words]
 
 
 def _balance_table(balances: Sequence[Balance]) -> Table:
@@ -110,7 +140,7 @@ def _balance_table(balances: Sequence[Balance]) -> Table:
         )
         for one in balances
     ]
-    header = ("Balance and test", "Error over noise", "Error over measured force", "R²")
+    header = ("Balance and test", "Error over expected scatter", "Error over measured force", "R²")
     return Table("Balances of held-out tests: as delivered → refitted → with the effects", header, rows)
 
 
@@ -161,7 +191,7 @@ def _proof_table(proof: Proof) -> Table:
         for gap in proof.gaps
     ]
     header = ("Phase and test", "As delivered", "Refitted", "With the effects", "Floor", "Closure")
-    return Table("Normalised RMS error on held-out tests (1: sensor noise)", header, rows)
+    return Table("Normalised RMS error on held-out tests (1: sensor noise alone)", header, rows)
 
 
 def _acted_on(found: Discovery) -> set[str]:
@@ -172,7 +202,7 @@ def _acted_on(found: Discovery) -> set[str]:
 def _headlines(found: Discovery) -> list[Headline]:
     verdict = found.verdict
     named = ", ".join(title_of(one.family) for one in verdict.effects) or "none"
-    shown = [Headline(_VERDICTS[verdict.word][0], "Verdict")]
+    shown = [Headline(_verdict_of(found)[0], "Verdict")]
     if verdict.word == "sensor":
         first = verdict.sensors[0]
         size = f"{first.estimate.value:.4g} {first.estimate.unit}"
@@ -180,12 +210,12 @@ def _headlines(found: Discovery) -> list[Headline]:
     else:
         shown.append(Headline(named, "Effects"))
     if errors := held_out_errors(found):
-        widest, (_, refitted, after) = max(errors.items(), key=lambda one: one[1][1])
+        (widest, unit), (_, refitted, after) = max(errors.items(), key=lambda one: one[1][1])
         shown.append(
             Headline(
                 f"{number(refitted)} → {number(after)}",
                 f"Largest normalised RMS error: {widest}",
-                "refitted → with the effects; 1 is sensor noise",
+                f"refitted → with the effects; 1 is the {unit}",
             )
         )
     return shown
@@ -204,7 +234,9 @@ def _effect_blocks(found: Discovery) -> list[Block]:
         blocks.append(Table("Families fitted in an effect's place", ("On", "Family", "Probability"), chances))
     if verdict.remainder:
         left = [(kind, f"{100.0 * share:.2g} %") for kind, share in verdict.remainder.items()]
-        blocks.append(Table("Remainder of the squares beyond noise", ("Residual", "Share of the refit's"), left))
+        blocks.append(
+            Table("Remainder of the squares beyond the expected scatter", ("Residual", "Share of the refit's"), left)
+        )
     for one in verdict.effects:
         family = find_family(one.form or one.family)
         p_value = "less than 1e-300" if one.p_value < 1e-300 else f"{one.p_value:.1g}"
@@ -214,6 +246,8 @@ def _effect_blocks(found: Discovery) -> list[Block]:
             f"{family.equation}. Gain of log-likelihood {number(one.gain)}; p-value, corrected for the number of "
             f"candidates: {p_value}. Often confused with: {confused}.",
         ]
+    if verdict.effects:
+        blocks += filter(None, [interval_note(found)])
     if lines := advice(found):
         blocks += ["The campaign does not distinguish the candidates. Tests that would:", bullet_list(lines)]
     if found.next_tests:  # simulated with one effect and fitted with the other
@@ -232,7 +266,8 @@ def _effect_blocks(found: Discovery) -> list[Block]:
         blocks.append(residual_function_figure(verdict.residual_function))
     elif verdict.word == "unexplained":
         blocks.append(
-            "The residual exceeds noise and is not a function of an actuator's or strut's position or velocity."
+            "The residual exceeds the expected scatter and is no function of an actuator's or strut's position or "
+            "velocity."
         )
     if verdict.where:
         blocks.append(f"The largest residuals are in: {'; '.join(s.description for s in verdict.where)}.")
@@ -254,12 +289,18 @@ def _proof_blocks(found: Discovery) -> list[Block]:
         "Floor: expected of a model that lacks nothing, by sensor noise, uncertain numbers and oil that warms. "
         "Closure: (refitted − with the effects) ∕ (refitted − floor); –: not applicable, already at the floor."
     )
-    return [gap_figure(found), _proof_table(found.proof), closure, _balance_table(found.balances)]
+    return [
+        gap_figure(found),
+        _proof_table(found.proof),
+        closure,
+        _balance_table(found.balances),
+        balance_note(found.balances),
+    ]
 
 
 def _considered(found: Discovery) -> list[Block]:
     gates = [found.numbers.number(f"accept.{gate}") for gate in ("gain", "confusable")]
-    blocks: list[Block] = []
+    blocks: list[Block] = [*before_screening(found.search)]
     for k, one in enumerate(found.search.rounds, start=1):
         blocks.append(gain_figure(one, k, *gates))
         rows = [
@@ -283,14 +324,17 @@ def _considered(found: Discovery) -> list[Block]:
 
 def _parameter_blocks(found: Discovery) -> list[Block]:
     changed, sensors = found.verdict.changed, found.verdict.sensors
+    narrow = filter(None, [interval_note(found), form_note(found)] if changed else [])
     return [
         _changed_table(found.verdict) if changed else "No parameter differs.",
+        *narrow,
         _sensor_table(sensors) if sensors else "All sensors are within the ranges of the sensors file.",
     ]
 
 
 def _assumptions(found: Discovery) -> list[Block]:
     lines = [
+        EXPECTED_SCATTER,
         "Priors of parameters and ranges of sensor errors are from the machine's and the sensors' files; most are "
         "assumed. Noise is simulated from the sensors' file, not estimated from the residual.",
         "A fitted parameter within 3 sigma of its prior counts as calibration; beyond that it is reported as an "
@@ -298,5 +342,7 @@ def _assumptions(found: Discovery) -> list[Block]:
         "Candidates are ranked to first order; the best are fitted in full together with all known unknowns.",
     ]
     if hidden := found.verdict.untestable:
-        lines.append(f"Not testable with this campaign: {', '.join(hidden)}; typical sizes are within the noise.")
+        lines.append(
+            f"Not testable with this campaign: {', '.join(hidden)}; typical sizes are within the expected scatter."
+        )
     return [bullet_list(lines), numbers_used(found.numbers)]

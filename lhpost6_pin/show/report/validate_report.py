@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from ...identification.known_slip import UNKNOWN_SLIP
 from ...identification.validation import PHASES, Validation
 from .control_blocks import assumed_in, load_of, numbers_used
 from .page import Block, Headline, Level, Page, Section, bullet_list, number, save_page
@@ -93,12 +94,13 @@ def validation_notes(found: Validation) -> list[str]:
     tests: dict[str, dict[str, None]] = {}
     for phase in found.phases:
         missing = [f"no {PHASES[phase.number]}: {phase.reason}"] if phase.reason else []
-        for words in (*missing, *phase.notes * (phase.number > 1)):
+        for words in (*missing, *phase.notes * (phase.number > 1), *([phase.slip] if phase.slip else [])):
             tests.setdefault(words, {})[phase.test] = None
-    return [
+    notes = [
         f"{'All tests' if len(names) == len(found.tests) > 1 else ', '.join(names)}: {words}"
         for words, names in tests.items()
     ]
+    return [*notes, UNKNOWN_SLIP] if any(phase.slip for phase in found.phases) else notes
 
 
 def _assumptions(found: Validation) -> list[Block]:

@@ -17,10 +17,13 @@ from scipy.constants import g
 
 from lhpost6_pin.core.errors import RecordError, UnknownNameError
 from lhpost6_pin.data.metrics import QUANTITIES
-from lhpost6_pin.show.report.page import Page, bar, number, render_page, text
+from lhpost6_pin.mechanics.specimen_modes import SpecimenMode
+from lhpost6_pin.show.report.interaction_section import interaction_blocks
+from lhpost6_pin.show.report.page import Page, Table, bar, number, render_page, text
 from lhpost6_pin.show.report.plots import ACHIEVED, Row, Trace, envelope, time_figure
 from lhpost6_pin.show.report.run_report import RunSummary, lead_summary, write_run_report
 from lhpost6_pin.show.report.scales import SCALES
+from lhpost6_pin.tuning.interaction import Cut, Interaction
 
 AXES = ["x", "y", "z", "roll", "pitch", "yaw"]
 ACTUATORS = ["H1", "H2", "H3", "H4", "V1", "V2", "V3", "V4", "V5", "V6"]
@@ -587,3 +590,17 @@ def test_a_browser_draws_every_plot_without_an_error_and_zooms_all_time_axes_tog
     assert found["linked"] == [2, 4]
     assert found["moved"] == pytest.approx([2.4, 4.4])  # a fifth of the window
     assert found["reset"] == pytest.approx([0.0, 8.0 - 1 / 512])
+
+
+@pytest.mark.parametrize("rigid", [True, False])
+def test_modes_of_a_specimen_are_listed_and_only_a_rigid_one_is_called_rigid(rigid):
+    modes = () if rigid else (SpecimenMode(1.6, 0.03, np.array([44e3, 0.0, 0.0, 0.0, 0.0, 0.0])),)
+    f = np.geomspace(0.1, 40.0, 50)
+    flat = np.ones((50, 6), complex)
+    cuts = {"with specimen": tuple(Cut(axis, 1.0, 1.0, 1.0, 1.0) for axis in AXES)}
+    found = Interaction(f, tuple(AXES), {"bare table": flat, "with specimen": flat}, cuts, modes, rigid)
+    blocks = interaction_blocks(make_record(), found)
+    captions = [block.caption for block in blocks if isinstance(block, Table)]
+    assert ("Modes of the specimen on a fixed base" in captions) is not rigid
+    assert any("at the specimen's periods" in caption for caption in captions) is not rigid
+    assert any("rigid" in block for block in blocks if isinstance(block, str)) is rigid

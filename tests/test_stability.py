@@ -1,10 +1,13 @@
 """Stability of the controlled table: eigenvalues of its sampled closed loop against simulation and against margins."""
 
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from machine_cases import machine_named
+from scipy.linalg import eigvalsh
 
 from lhpost6_pin.control import Notch, controlled, load_controller
 from lhpost6_pin.core.names import AXES, SAMPLE_RATE
@@ -112,3 +115,18 @@ def test_a_tuned_loop_and_a_heavier_specimen_differ_in_the_interaction(tmp_path)
     roll = found.cuts[MOUNTED][found.axes.index("roll")]
     assert roll.peak > 1.4 and 25.0 < roll.peak_frequency <= 33.0  # the margin above is 1.8 dB at 33 Hz
     assert found.responses[BARE].shape == (len(found.frequency), 6)
+    assert found.rigid
+
+
+def test_modes_that_a_specimen_states_by_its_matrices_are_those_of_the_interaction():
+    """Frequencies by an eigenvalue problem of the file's own matrices; masses of all modes add up to what moves."""
+    machine = MACHINE.with_specimen("tall_column")
+    found = find_interaction(machine, SHIPPED)
+    entries = tomllib.loads(Path(machine.specimen.file).read_text())["matrices"]
+    mass, stiffness = entries["mass"]["value"], entries["stiffness"]["value"]
+    expected = np.sqrt(eigvalsh(stiffness, mass)) / (2 * np.pi)
+    np.testing.assert_allclose([mode.frequency for mode in found.modes], expected, rtol=1e-9)  # rounding
+    np.testing.assert_allclose([mode.damping for mode in found.modes], 0.03, rtol=1e-9)
+    total = sum(mode.mass for mode in found.modes)
+    np.testing.assert_allclose(total[:3], [44e3, 44e3, 0.0], rtol=1e-9, atol=1e-6)  # its matrices move no mass in z
+    assert not found.rigid

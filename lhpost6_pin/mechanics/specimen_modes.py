@@ -15,7 +15,7 @@ __all__ = ["SpecimenMode", "specimen_modes"]
 
 
 class SpecimenMode(NamedTuple):
-    """An oscillation of the specimen's joints, the platen held fast."""
+    """An oscillation of the specimen, the platen held fast."""
 
     frequency: float  # undamped [Hz]
     damping: float  # ratio [1]
@@ -23,16 +23,28 @@ class SpecimenMode(NamedTuple):
 
 
 def specimen_modes(plant: Plant, linear: LinearPlant | None = None) -> tuple[SpecimenMode, ...]:
-    """Modes of the free joints of a specimen about rest, slowest first; none for a rigid specimen.
+    """Modes of a specimen about rest, slowest first: those it states and those of its free joints; none if rigid.
 
-    Stiffness, damping and mass are those of the linearised plant, whose joint forces are M times its accelerations
+    Of joints, stiffness, damping and mass are those of the linearised plant, whose joint forces are M times its accelerations
     (`linear`: of `linearize` at rest, if known); damping by the diagonal of the modal damping matrix. Coordinates that
     nothing returns (zero or negative stiffness) are left out. The effective mass of mode phi along axis k is
-    (phi' M_jk)^2 / phi' M_jj phi.
+    (phi' M_jk)^2 / phi' M_jj phi; of stated modes, which are mass-normalised, the square of their participation.
     """
+    return tuple(sorted([*_stated_modes(plant), *_joint_modes(plant, linear)], key=lambda mode: mode.frequency))
+
+
+def _stated_modes(plant: Plant) -> list[SpecimenMode]:
+    """Modes that a specimen states itself, or by its matrices."""
+    omega = np.sqrt(plant.modes["stiffness"])
+    rows = zip(omega, plant.modes["damping"], plant.modes["participation"], strict=True)
+    return [SpecimenMode(float(w / (2.0 * np.pi)), float(d / (2.0 * w)), np.square(part)) for w, d, part in rows]
+
+
+def _joint_modes(plant: Plant, linear: LinearPlant | None) -> list[SpecimenMode]:
+    """Modes of the free joints of a specimen about rest."""
     platen, nv = plant.axes.size, plant.model.nv
     if nv == platen:
-        return ()
+        return []
     rest = find_equilibrium(plant)
     linear = linearize(plant, rest.state, rest.spool) if linear is None else linear
     mass = np.triu(pin.crba(plant.model, plant.model.createData(), rest.state.q))
@@ -48,4 +60,4 @@ def specimen_modes(plant: Plant, linear: LinearPlant | None = None) -> tuple[Spe
         omega, moved = float(np.sqrt(square)), np.zeros(6)
         moved[plant.axes] = np.square(shape @ mass[platen:, :platen])
         found.append(SpecimenMode(omega / (2.0 * np.pi), float(shape @ damping @ shape) / (2.0 * omega), moved))
-    return tuple(found)
+    return found

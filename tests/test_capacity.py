@@ -17,6 +17,7 @@ from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import leg_displacements
 from lhpost6_pin.motions import find_motion, make_target, with_scale
 from lhpost6_pin.show.capacity_tables import judged_by, machine_capacity
+from lhpost6_pin.simulation.limit_use import plant_limits
 from lhpost6_pin.simulation.motion_limits import check_motion_limits
 
 
@@ -120,6 +121,10 @@ def test_shares_of_valves_and_strokes_are_rates_over_speeds_and_elongations_over
     share = found["actuator velocity"].share
     speeds = (1.0 - plant.machine.limits.valve_reserve) * actuator_speeds(plant)
     assert found["actuator velocity"].names == plant.machine.actuator_names
+    assert found["actuator velocity"].of.endswith("less the reserve of 15 %")
+    limits = plant_limits(plant)  # of reports and ensembles: the same measure, so that none contradicts the refusal
+    np.testing.assert_array_equal(limits["actuator_extending"], speeds[:, 0])
+    np.testing.assert_array_equal(limits["actuator_retracting"], speeds[:, 1])
     assert share[0, 4] == pytest.approx(0.1 / speeds[4, 0])
     assert share[1, 4] == pytest.approx(0.1 / speeds[4, 1])
     assert np.all(found["actuator stroke"].share == 0.0)

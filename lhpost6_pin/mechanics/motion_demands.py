@@ -23,6 +23,7 @@ from .specimen_joints import specimen_mass
 __all__ = ["make_motion_check"]
 
 OVERTURNING = ("roll", "pitch")
+OF_SPEED = "of the unloaded velocity of its valves"
 
 
 def make_motion_check(plant: Plant) -> MotionCheck:
@@ -32,7 +33,8 @@ def make_motion_check(plant: Plant) -> MotionCheck:
     Raises SimulationError or OutOfRangeError if the actuators cannot hold what is mounted at rest.
     """
     machine = plant.machine
-    speeds = (1.0 - machine.limits.valve_reserve) * actuator_speeds(plant)
+    reserve = machine.limits.valve_reserve
+    speeds, of_speed = (1.0 - reserve) * actuator_speeds(plant), f"{OF_SPEED} less the reserve of {100 * reserve:g} %"
     strokes, names = np.array([a.stroke for a in machine.actuators]), machine.actuator_names
     strength, rest = stated_strength(machine.parameters), rest_forces(plant)
     _refuse_unheld(plant, rest.share[0])
@@ -44,7 +46,7 @@ def make_motion_check(plant: Plant) -> MotionCheck:
         moved, rate = moved[:, : plant.spools], rate[:, : plant.spools]
         fed = np.where(rate >= 0.0, rate / speeds[:, 0], -rate / speeds[:, 1])
         found = [
-            Demand("actuator velocity", names, fed, "of the unloaded velocity of its valves"),
+            Demand("actuator velocity", names, fed, of_speed if reserve else OF_SPEED),
             Demand("actuator stroke", names, np.abs(moved) / strokes, "of its stroke"),
         ]
         needed = required_forces(plant, PlatenMotion(displacement, velocity, acceleration))

@@ -25,10 +25,11 @@ class SpecimenMode(NamedTuple):
 def specimen_modes(plant: Plant, linear: LinearPlant | None = None) -> tuple[SpecimenMode, ...]:
     """Modes of a specimen about rest, slowest first: those it states and those of its free joints; none if rigid.
 
-    Of joints, stiffness, damping and mass are those of the linearised plant, whose joint forces are M times its accelerations
-    (`linear`: of `linearize` at rest, if known); damping by the diagonal of the modal damping matrix. Coordinates that
-    nothing returns (zero or negative stiffness) are left out. The effective mass of mode phi along axis k is
-    (phi' M_jk)^2 / phi' M_jj phi; of stated modes, which are mass-normalised, the square of their participation.
+    Of joints, stiffness, damping and mass are those of the linearised plant, whose joint forces are M times its
+    accelerations (`linear`: of `linearize` at rest, if known); damping by the diagonal of the modal damping matrix.
+    Coordinates that nothing returns (zero or negative stiffness) are left out. The effective mass of mode phi along
+    axis k is (phi' M_jk)^2 / phi' M_jj phi; of stated modes, which are mass-normalised, the square of their
+    participation.
     """
     return tuple(sorted([*_stated_modes(plant), *_joint_modes(plant, linear)], key=lambda mode: mode.frequency))
 

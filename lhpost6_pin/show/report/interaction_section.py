@@ -63,7 +63,7 @@ def interaction_blocks(record: xr.Dataset, found: Interaction) -> list[Block]:
     elif found.rigid:
         shown.append("The specimen is rigid: it has no periods of its own.")
     else:
-        shown.append("No mode of the specimen on a fixed base is known: nothing returns its joints, or it runs in a program of its own.")
+        shown.append("The specimen has no mode on a fixed base that its model states.")
     return shown
 
 

@@ -51,20 +51,20 @@ def make_motion_check(plant: Plant) -> MotionCheck:
         ]
         needed = required_forces(plant, PlatenMotion(displacement, velocity, acceleration))
         beyond, at = needed.share - rest.share, rest.share[0]
-        force = span.middle + span.half * needed.share
         push, pull = np.maximum(beyond, 0.0) / (1.0 - at), np.maximum(-beyond, 0.0) / (1.0 + at)
-        found.append(Demand("actuator push", names, push, "of its push beyond rest", force, "N"))
+        more, less = span.half * np.maximum(beyond, 0.0), span.half * np.maximum(-beyond, 0.0)  # of force, from rest
+        found.append(Demand("actuator push", names, push, "of its push beyond rest", more, "N"))
         for some, quantity, of in (
             (~single, "actuator pull", "of its pull beyond rest"),
             (single, "actuator unloading", "of its force at rest down to its least chamber pressure"),
         ):
             if some.any():
                 these = [name for name, own in zip(names, some, strict=True) if own]
-                found.append(Demand(quantity, these, pull[:, some], of, force[:, some], "N"))
+                found.append(Demand(quantity, these, pull[:, some], of, less[:, some], "N"))
         in_space = np.einsum("nij,nj->ni", needed.turn, needed.wrench[:, :3])
-        more = needed.wrench - rest.wrench
-        found += _on_parts(plant, strength, displacement, in_space, more[:, 3:])
-        return [*found, *_along_axes(plant, wrench_at_bearings(plant, more), along)]
+        wrench = needed.wrench - rest.wrench
+        found += _on_parts(plant, strength, displacement, in_space, wrench[:, 3:])
+        return [*found, *_along_axes(plant, wrench_at_bearings(plant, wrench), along)]
 
     return check
 

@@ -11,7 +11,7 @@ from .equilibrium import find_equilibrium
 from .linearize import LinearPlant, linearize
 from .plant import Plant
 
-__all__ = ["SpecimenMode", "specimen_modes"]
+__all__ = ["SpecimenMode", "specimen_growth", "specimen_modes"]
 
 
 class SpecimenMode(NamedTuple):
@@ -43,15 +43,10 @@ def _stated_modes(plant: Plant) -> list[SpecimenMode]:
 
 def _joint_modes(plant: Plant, linear: LinearPlant | None) -> list[SpecimenMode]:
     """Modes of the free joints of a specimen about rest."""
-    platen, nv = plant.axes.size, plant.model.nv
-    if nv == platen:
+    if not plant.articulated:
         return []
-    rest = find_equilibrium(plant)
-    linear = linearize(plant, rest.state, rest.spool) if linear is None else linear
-    mass = np.triu(pin.crba(plant.model, plant.model.createData(), rest.state.q))
-    mass += np.triu(mass, 1).T
-    force = mass @ linear.A[nv : 2 * nv]
-    stiffness, damping = -force[platen:, platen:nv], -force[platen:, nv + platen : 2 * nv]
+    mass, stiffness, damping = _joint_matrices(plant, linear)
+    platen = plant.axes.size
     own = mass[platen:, platen:]
     squares, shapes = eigh(0.5 * (stiffness + stiffness.T), own)  # shapes' M shapes = 1
     found, smallest = [], 1e-9 * float(np.abs(squares).max())
@@ -62,3 +57,27 @@ def _joint_modes(plant: Plant, linear: LinearPlant | None) -> list[SpecimenMode]
         moved[plant.axes] = np.square(shape @ mass[platen:, :platen])
         found.append(SpecimenMode(omega / (2.0 * np.pi), float(shape @ damping @ shape) / (2.0 * omega), moved))
     return found
+
+
+def specimen_growth(plant: Plant) -> float:
+    """Rate [1/s] of the fastest growing motion of a specimen's free joints, the platen held fast; negative: all decay.
+
+    Minus infinity for a specimen without free joints.
+    """
+    if not plant.articulated:
+        return -np.inf
+    mass, stiffness, damping = _joint_matrices(plant)
+    own, n = mass[plant.axes.size :, plant.axes.size :], len(stiffness)
+    rates = np.linalg.solve(own, np.hstack([-stiffness, -damping]))
+    return float(np.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), rates])).real.max())
+
+
+def _joint_matrices(plant: Plant, linear: LinearPlant | None = None) -> tuple[Array, Array, Array]:
+    """Mass matrix (nv, nv) at rest, and stiffness and damping (n, n) of the free joints, the platen held fast."""
+    platen, nv = plant.axes.size, plant.model.nv
+    rest = find_equilibrium(plant)
+    linear = linearize(plant, rest.state, rest.spool) if linear is None else linear
+    mass = np.triu(pin.crba(plant.model, plant.model.createData(), rest.state.q))
+    mass += np.triu(mass, 1).T
+    force = mass @ linear.A[nv : 2 * nv]
+    return mass, -force[platen:, platen:nv], -force[platen:, nv + platen : 2 * nv]

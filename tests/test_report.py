@@ -1,6 +1,7 @@
 """Run reports: complete, self-contained, safe against hostile names, light, and drawn by a real browser."""
 
 import base64
+import io
 import re
 import zlib
 from pathlib import Path
@@ -13,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from page_cases import Reader, numbers
 from plotly.offline import get_plotlyjs
+from rich.console import Console
 from scipy.constants import g
 
 from lhpost6_pin.core.errors import RecordError, UnknownNameError
@@ -23,6 +25,7 @@ from lhpost6_pin.show.report.page import Page, Table, bar, number, render_page, 
 from lhpost6_pin.show.report.plots import ACHIEVED, Row, Trace, envelope, time_figure
 from lhpost6_pin.show.report.run_report import RunSummary, lead_summary, write_run_report
 from lhpost6_pin.show.report.scales import SCALES
+from lhpost6_pin.show.terminal import _rich
 from lhpost6_pin.tuning.interaction import Cut, Interaction
 
 AXES = ["x", "y", "z", "roll", "pitch", "yaw"]
@@ -590,6 +593,20 @@ def test_a_browser_draws_every_plot_without_an_error_and_zooms_all_time_axes_tog
     assert found["linked"] == [2, 4]
     assert found["moved"] == pytest.approx([2.4, 4.4])  # a fifth of the window
     assert found["reset"] == pytest.approx([0.0, 8.0 - 1 / 512])
+
+
+@pytest.mark.parametrize("width", [60, 80, 160])
+def test_no_column_of_a_table_is_lost_in_a_narrow_terminal(width):
+    """All words of a long last column are printed, though numbers before it would fill the line."""
+    words = [f"source{k}" for k in range(12)]
+    row = ("hydraulics.root_regularisation", "0.15, 0.25, 0.35, 0.45", "m/s2 | rad/s2", "assumed", " ".join(words))
+    table = Table("", ("quantity", "value", "unit", "evidence", "source"), [row])
+    console = Console(width=width, record=True, file=io.StringIO())
+    console.print(_rich(table, width))
+    printed = console.export_text()
+    columns = [line.split("\N{BOX DRAWINGS LIGHT VERTICAL}") for line in printed.splitlines() if line.startswith("│")]
+    assert "".join(line[-2] for line in columns).replace(" ", "") == "".join(words)
+    assert "".join(line[2] for line in columns).replace(" ", "") == row[1].replace(" ", "")
 
 
 @pytest.mark.parametrize("rigid", [True, False])

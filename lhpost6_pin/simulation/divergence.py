@@ -6,7 +6,7 @@ Runge-Kutta 4; it grows at ln|R| / dt. The modes are those of the plant linearis
 
 import numpy as np
 
-from ..core.arrays import Array, Complex
+from ..core.arrays import Complex
 from ..core.names import SCHEMES
 from ..mechanics.equilibrium import find_equilibrium
 from ..mechanics.linearize import linearize
@@ -23,7 +23,7 @@ def amplified_mode(plant: Plant, scheme: str, rate: int) -> tuple[float, float]:
     if scheme == SCHEMES[0]:
         return 0.0, 0.0
     rest = find_equilibrium(plant)
-    own = np.linalg.eigvals(linearize(plant, rest.state, rest.spool).A)
+    own = np.linalg.eigvals(linearize(plant, rest.state, rest.spool).A).astype(complex)
     own = own[(own.real < 0.0) & (own.imag >= 0.0)]
     growth = rate * np.log(np.abs(_factor(own / rate, scheme)))
     worst = int(np.argmax(growth))
@@ -41,6 +41,6 @@ def scheme_divergence(plant: Plant, scheme: str, rate: int, time: float) -> str:
     )
 
 
-def _factor(z: Complex, scheme: str) -> Complex | Array:
+def _factor(z: Complex, scheme: str) -> Complex:
     """Factor of one step on a mode whose rate times the step is z."""
-    return 1.0 + z if scheme == "euler" else 1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)))
+    return np.asarray(1.0 + z if scheme == "euler" else 1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0))))

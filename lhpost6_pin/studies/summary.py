@@ -146,10 +146,10 @@ def _loops(results: xr.Dataset) -> Iterator[LoopOf]:
     """Loops that are not stable."""
     if "loop" not in results:
         return
-    for place, names in places_of(results, "specimen", "controller"):
+    for place, (specimen, controller) in places_of(results, "specimen", "controller"):
         verdict = str(results["loop"].values[place])
         if verdict not in ("", "stable"):
-            yield LoopOf(*names, verdict, str(results["loop_summary"].values[place]))
+            yield LoopOf(specimen, controller, verdict, str(results["loop_summary"].values[place]))
 
 
 def _counted(words: Array) -> dict[str, int]:

@@ -9,14 +9,17 @@ from run_cases import driven
 from lhpost6_pin.core.errors import OutOfRangeError
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.actuator_forces import rest_forces, unit_shares
 from lhpost6_pin.mechanics.capacity import capacity_table, flow_readings, payload_table
 from lhpost6_pin.mechanics.equilibrium import actuator_speeds
 from lhpost6_pin.mechanics.linearize import linearize, oil_column_modes
 from lhpost6_pin.mechanics.motion_demands import make_motion_check
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import leg_displacements
+from lhpost6_pin.mechanics.rigid_body import platen_inertia
 from lhpost6_pin.motions import find_motion, make_target, with_scale
-from lhpost6_pin.show.capacity_tables import judged_by, machine_capacity
+from lhpost6_pin.show.capacity_tables import capacity_tables, judged_by, machine_capacity
+from lhpost6_pin.simulation.limit_use import plant_limits
 from lhpost6_pin.simulation.motion_limits import check_motion_limits
 
 
@@ -102,6 +105,30 @@ def test_linear_plant_predicts_the_first_milliseconds(plant, rest):
     assert run.v[-1] == pytest.approx(x[6:12], abs=2e-3 * np.abs(x[6:12]).max())  # second order in the step
 
 
+def test_with_a_number_of_valves_the_velocities_are_theirs_and_titles_state_it():
+    """One of two equal servovalves gives half the flow, less the same leak; the limits below keep the reserve of it."""
+    all_open, one = (machine_capacity(load_machine(), valves) for valves in (0, 1))
+    (first, *_, last), (_, *_, limits) = capacity_tables(one), capacity_tables(all_open)
+    named = "1 servovalve open on each horizontal actuator"
+    assert first.caption.endswith(named) and last.caption.endswith(named) and limits.caption.endswith(named)
+    assert capacity_tables(all_open)[0].caption.endswith("all servovalves open")
+    speeds = [{row.name: row for row in found.rows}["peak velocity x"] for found in (one, all_open)]
+    assert speeds[0].model == pytest.approx(speeds[1].model / 2, rel=0.01)
+    assert speeds[0].printed is None and speeds[1].printed == 3.0  # Table 2.2 has all valves open
+    bound = next(b for b in one.loads[0].axes[0].velocity if "valve" in b.by)
+    assert bound.value == pytest.approx(0.85 * speeds[0].model)
+
+
+def test_two_values_of_an_angular_acceleration_have_their_reason(plant, table):
+    """About B there is a moment alone, which gives the upper table's value; about C a force along y comes with it."""
+    assert "about B, its centre of gravity" in judged_by(machine_capacity(load_machine()))
+    mass, rest, per = platen_inertia(plant.model, plant.machine)[1], rest_forces(plant).share[0], unit_shares(plant)
+    for axis, k in (("roll", 3), ("pitch", 4)):
+        share = per @ (mass @ np.eye(6)[k])
+        first = np.min(np.where(share > 0.0, 1.0 - rest, 1.0 + rest)[share != 0.0] / np.abs(share[share != 0.0]))
+        assert table[f"peak acceleration {axis}"].model == pytest.approx(first, rel=1e-9)  # rounding
+
+
 def test_actuator_check_finds_what_the_valves_cannot_feed(plant):
     """SXH1 asks 2.80 m/s of a table that gives 2.74 and keeps a reserve: refused, with the scale that fits."""
     both = make_plant(load_machine().with_params({"horizontal.valves": 2}))
@@ -120,6 +147,10 @@ def test_shares_of_valves_and_strokes_are_rates_over_speeds_and_elongations_over
     share = found["actuator velocity"].share
     speeds = (1.0 - plant.machine.limits.valve_reserve) * actuator_speeds(plant)
     assert found["actuator velocity"].names == plant.machine.actuator_names
+    assert found["actuator velocity"].of.endswith("less the reserve of 15 %")
+    limits = plant_limits(plant)  # of reports and ensembles: the same measure, so that none contradicts the refusal
+    np.testing.assert_array_equal(limits["actuator_extending"], speeds[:, 0])
+    np.testing.assert_array_equal(limits["actuator_retracting"], speeds[:, 1])
     assert share[0, 4] == pytest.approx(0.1 / speeds[4, 0])
     assert share[1, 4] == pytest.approx(0.1 / speeds[4, 1])
     assert np.all(found["actuator stroke"].share == 0.0)

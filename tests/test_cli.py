@@ -346,6 +346,7 @@ def test_commands_of_the_469d_say_why_they_take_no_other_controller(lhpost6, tmp
         (("--amplitude", "0"), ("amplitude is 0.0", "above zero")),
         (("--amplitude", "-1"), ("--amplitude",)),
         (("--amplitude", "10", "--frequency", "5"), ("largest scale that fits",)),
+        (("--amplitude", "0.75"), ("largest scale that fits is 0.49", "largest --amplitude that fits is 0.36")),
     ],
 )
 def test_a_sine_that_cannot_be_is_refused(lhpost6, tmp_path, arguments, phrases):

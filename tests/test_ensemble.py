@@ -22,17 +22,18 @@ from lhpost6_pin.identification.calibration import with_parameters
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.machine.parameters import load_parameters
 from lhpost6_pin.motions import response_spectrum
-from lhpost6_pin.show.ensemble_tables import spread_table
+from lhpost6_pin.show.ensemble_tables import ensemble_verdict, risk_table, spread_table
 from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.studies import ensemble
 from lhpost6_pin.studies.draws import draw_machines
 from lhpost6_pin.studies.ensemble import run_ensemble
 from lhpost6_pin.studies.exceedance import ANY, critical_scales, exceedance, exceedances
 from lhpost6_pin.studies.importance import importances
+from lhpost6_pin.studies.loops import loops_of
 from lhpost6_pin.studies.plan_file import load_plan, plan_from
 from lhpost6_pin.studies.quantities import LIMITS
 from lhpost6_pin.studies.store import BlockStore, open_results
-from lhpost6_pin.studies.summary import Spread, summarise
+from lhpost6_pin.studies.summary import Configuration, EnsembleSummary, LoopOf, Spread, summarise
 
 NUMBERS = load_parameters(models_folder() / "procedures" / "ensemble.toml")
 SINE = {"name": "sine", "options": {"amplitude": 0.05, "cycles": 1.0, "ramp_cycles": 0.5}}
@@ -354,6 +355,7 @@ def test_specimens_controllers_and_guided_machines_have_their_place(tmp_path):
         shear = results["base_shear"].squeeze()
         acceleration = float(results["peak_acceleration"].sel(axis="x", specimen="block").squeeze())
         assert np.isnan(shear.sel(specimen="none"))
+        assert results["loop"].sel(specimen="none").item() == "stable"
         mass = 4.9e6 / made.machine.platen.gravity
         # a rigid block: its shear is mass times acceleration of its mass centre, which also rocks a little
         assert float(shear.sel(specimen="block")) == pytest.approx(mass * acceleration, rel=0.15)
@@ -368,6 +370,54 @@ def test_ratios_are_in_per_cent_as_everywhere():
     one = Spread("sine", 1.0, "none", "tuned", "acceleration RRMSE, worst axis", "1", quantiles, 0.2, 0.3, 9)
     (row,) = spread_table([one]).rows
     assert row[1:4] == ("%", "22.3", "20.0 to 30.0")
+
+
+def _summary(*configurations, scales=(0.8, 1.2, 1.6), spreads=(), loops=()):
+    return EnsembleSummary(
+        "e", "LHPOST6", 24, {}, {}, ("limits", "strengths"), 0, np.array(scales), spreads, configurations, (), "",
+        0.05, loops,
+    )  # fmt: skip
+
+
+def test_a_saturated_limit_is_reached_between_two_scales_and_not_at_the_upper_one():
+    """A clipped command is no larger than full spool: between the runs its demand is not known."""
+    scales, use = np.array([0.8, 1.2, 1.6]), np.array([[0.5] * 8, [0.8] * 8, [1.0] * 8])
+    one = exceedance("spool", critical_scales(use, scales), scales, level=0.05, confidence=0.95)
+    found = _summary(Configuration("ridgecrest", "none", "tuned", (one,)))
+    assert "The risk of reaching spool is 5 % between the scales 1.2 and 1.6" in ensemble_verdict(found)
+    assert risk_table(found).rows[0][1] == "1.2 to 1.6"
+    rising = exceedance("push", critical_scales(1.1 * use, scales), scales, level=0.05, confidence=0.95)
+    assert rising.risk_after == 0.0 and 1.2 < rising.risk_scale < 1.6
+
+
+def test_results_name_the_one_scale_that_they_are_of():
+    rows = [Spread("sine", s, "none", "tuned", "push", "1", np.ones(3), 1.0, 1.0, 8) for s in (0.8, 1.2, 1.6)]
+    assert spread_table(rows[1:2]).caption == "Results at scale 1.2"
+    assert spread_table(rows).caption == "Results" and "Scale" in spread_table(rows).header
+
+
+def test_configurations_of_one_risk_are_alike_and_none_is_the_worst():
+    scales = np.array([0.8, 1.2, 1.6])
+    none, some = (
+        exceedance(ANY, critical_scales(np.outer(scales, np.full(8, c)), scales), scales, level=0.05, confidence=0.95)
+        for c in (0.1, 0.7)
+    )
+    configurations = [Configuration("ridgecrest", s, "tuned", (none,)) for s in ("none", "tall_column")]
+    assert "All 2 configurations alike:" in ensemble_verdict(_summary(*configurations))
+    worse = [*configurations, Configuration("ridgecrest", "block", "tuned", (some,))]
+    verdict = ensemble_verdict(_summary(*worse))
+    assert "The worst of 3 configurations:" in verdict and "(ridgecrest, specimen block, controller tuned)" in verdict
+
+
+@pytest.mark.long
+def test_the_loop_of_every_specimen_is_in_the_results_and_an_unstable_one_in_the_verdict():
+    """The block of the payload of Table 2.2 is not held by gains of the bare table; `run` says the same."""
+    loops = loops_of(plan(specimen=[{"name": "none"}, {"name": "block_4_9MN"}]))
+    assert loops["loop"][:, 0].tolist() == ["stable", "unstable"]
+    loop = LoopOf("block_4_9MN", "tuned", "unstable", str(loops["loop_summary"][1, 0]))
+    assert "With specimen block_4_9MN, controller tuned: The control loop is unstable" in ensemble_verdict(
+        _summary(loops=(loop,))
+    )
 
 
 def test_a_file_that_holds_no_ensemble_is_named(tmp_path):

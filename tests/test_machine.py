@@ -364,3 +364,9 @@ def test_an_added_effect_stays_when_a_parameter_changes_and_friction_of_zero_has
     assert ports("seal_friction") == LHPOST6.actuator_names
     assert ports("seal_friction", hold_down__seal_friction=1000.0)[-3:] == LHPOST6.strut_names
     assert ports("pad_friction", vertical__pad_friction=0.0) is None
+
+
+def test_a_machine_is_shown_in_a_line():
+    shown = repr(machine_named("lhpost6").with_specimen(PENDULUM))
+    assert shown.startswith("Machine('LHPOST6': 10 actuators, 3 struts") and "specimen pendulum" in shown
+    assert len(shown) < 200

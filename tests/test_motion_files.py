@@ -53,6 +53,17 @@ def test_a_record_and_its_exports_move_the_table_as_their_test_was_commanded(tmp
     assert np.abs(inner - target.displacement).max() < 1e-6 * np.abs(target.displacement).max()
 
 
+def test_a_record_of_another_program_that_states_no_layout_is_a_record(tmp_path, record, target):
+    """All attributes of a record are optional; `check` finds no error in it."""
+    path = tmp_path / "other.nc"
+    foreign = record.copy()
+    foreign.attrs = {"kind": "measured"}
+    foreign.to_netcdf(path, engine="h5netcdf")
+    assert load_record(path).sizes["time"] == len(target.time)
+    motion = load_any_motion(path)
+    np.testing.assert_array_equal(motion.samples, target.displacement)
+
+
 @pytest.mark.parametrize("form", ["nc", "csv", "mat"])
 def test_a_record_without_target_moves_the_table_as_the_platen_moved(tmp_path, record, target, form):
     measured = record.drop_vars("reference_displacement")

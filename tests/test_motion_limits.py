@@ -14,7 +14,7 @@ from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.machine.machine import build_machine, load_machine
 from lhpost6_pin.machine.strength import stated_strength
-from lhpost6_pin.mechanics.actuator_forces import axis_capacity, force_range, required_forces
+from lhpost6_pin.mechanics.actuator_forces import axis_capacity, force_range, required_forces, rest_forces
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.instant import platen_pose_at, required_wrench_at, wrench_at
 from lhpost6_pin.mechanics.motion_demands import make_motion_check
@@ -110,6 +110,21 @@ def test_a_tall_specimen_is_limited_by_the_unloading_of_a_vertical_actuator(tmp_
         p.quantity: p.utilisation for p in judge_motion(plant, PlatenMotion(still, still, push)).peaks if p.decides
     }
     assert max(shares.values()) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_peak_of_unloading_is_the_force_lost_that_its_share_is_of():
+    plant, still = plant_named("lhpost6"), np.zeros((2, 6))
+    rise = still.copy()
+    rise[:, 2] = [-5.0, 0.0]
+    found = {demand.quantity: demand for demand in make_motion_check(plant)(still, still, rise)}
+    span, rest = force_range(plant), rest_forces(plant)
+    at_rest = (span.middle + span.half * rest.share[0])[4:]  # of the vertical actuators
+    lost = found["actuator unloading"]
+    assert lost.value[0].min() > 0.0
+    np.testing.assert_allclose(lost.share * (at_rest - span.least[4:]), lost.value, rtol=1e-12)  # rounding
+    np.testing.assert_array_equal(lost.value[1], 0.0)  # at rest none is lost
+    push = found["actuator push"]
+    np.testing.assert_allclose(push.share[:, 4:] * (span.most[4:] - at_rest), push.value[:, 4:], rtol=1e-12)
 
 
 def test_performance_is_the_least_of_three_lines():

@@ -160,6 +160,22 @@ def test_numbers_alone_have_no_header_and_a_field_too_many_is_no_decimal_comma(t
         load_motion(written(tmp_path, "a.csv", text))
 
 
+@pytest.mark.parametrize("head", ["X Accel [g]", "x acceleration (g)", "x_acc_g", "East Acc g"])
+def test_the_word_of_a_quantity_before_its_unit_is_no_part_of_the_unit(tmp_path, head):
+    motion = load_motion(written(tmp_path, "m.csv", f"time_s,{head}\n0,0\n0.01,0.5\n0.02,0\n"))
+    assert motion.samples[1, 0] == pytest.approx(0.5 * 9.80665) and motion.quantity == "acceleration"
+    with pytest.raises(MotionError, match="has no unit"):
+        load_motion(written(tmp_path, "n.csv", "time_s,X Accel\n0,0\n0.01,0.5\n"))
+
+
+def test_a_gap_in_time_is_named_where_it_is(tmp_path):
+    """A gap moves the mean step, by which every step of the file would be wrong; it does not move the median."""
+    time = [0.01 * k for k in range(300)] + [3.5 + 0.01 * k for k in range(700)]
+    text = "time_s,ax_g\n" + "".join(f"{t:.2f},0.1\n" for t in time)
+    with pytest.raises(MotionError, match=r"before sample 300 \(t = 3.5 s\) is 0.51 s, the median is 0.01 s"):
+        load_motion(written(tmp_path, "gap.csv", text))
+
+
 def test_an_option_of_another_reader_and_a_column_that_is_not_there_are_refused(tmp_path):
     with pytest.raises(MotionError, match=r"A\.AT2: this kind of file says its units itself; leave --unit out"):
         load_motion(written(tmp_path, "A.AT2", at2_text(WAVE)), units="g")

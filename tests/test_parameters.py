@@ -217,6 +217,17 @@ def test_override_with_another_unit_of_the_same_dimension_is_converted():
     assert mm.actuators[0].platen_point == pytest.approx((6.19, 0.48, -1.25))
 
 
+def test_a_number_without_unit_far_from_the_stated_one_is_doubted(caplog):
+    """5 l/min/MPa by hand is 5 m3/s/Pa without its unit, eleven decades off; twice the stated number is a change."""
+    machine = load_machine()
+    machine.with_params({"horizontal.leakage": 5.0})
+    assert "horizontal.leakage: 5.0 has no unit and is taken in m3/s/Pa" in caplog.text
+    caplog.clear()
+    machine.with_params({"horizontal.leakage": {"value": 5.0, "unit": "l/min/MPa"}, "horizontal.seal_friction": 0.0})
+    machine.with_params({"horizontal.leakage": 9e-11, "platen.mass": [1e5, 1e5, 1e5]})
+    assert not caplog.text
+
+
 def test_one_component_can_have_more_servovalves_open_than_its_kind():
     assert [a.valves for a in load_machine().with_params({"H1.valves": 2}).actuators[:2]] == [2, 1]
 

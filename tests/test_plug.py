@@ -14,7 +14,7 @@ from run_cases import amid_ridgecrest
 
 from lhpost6_pin.control import Controller, load_controller
 from lhpost6_pin.control.plug import checked_command, is_plugged, load_plugged
-from lhpost6_pin.core.errors import ControllerError, SimulationError
+from lhpost6_pin.core.errors import ControllerError, MotionError, SimulationError
 from lhpost6_pin.core.names import AXES, SAMPLE_RATE
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.signals import align, delay, lowpass_zero_phase, rrmse
@@ -329,3 +329,11 @@ def test_lqg_refuses_what_its_model_has_no_place_for(lqg):
         plant = make_plant(other)
         with pytest.raises(ControllerError, match=message):
             lqg.init(plant, find_equilibrium(plant))
+
+
+def test_a_name_in_place_of_settings_and_of_a_scale_is_refused_with_what_to_give():
+    motion = find_motion("sine", amplitude=0.01, cycles=1)
+    with pytest.raises(SimulationError, match=r"settings are 'lhpost6'; give those of load_controller"):
+        rehearse(load_machine(), make_target(motion, axes="x"), "lhpost6", attrs={})
+    with pytest.raises(MotionError, match="scale is 'a'; give a finite number"):
+        make_target(motion, scale="a")

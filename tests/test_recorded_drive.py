@@ -7,11 +7,13 @@ from commands import refused
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import RecordError
 from lhpost6_pin.data.campaign import Campaign
-from lhpost6_pin.data.records import load_record
+from lhpost6_pin.data.records import load_record, make_record
+from lhpost6_pin.data.replay_comparison import compare
 from lhpost6_pin.data.valve_pairs import with_joint_spools
 from lhpost6_pin.identification.validation import validate
 from lhpost6_pin.laws.orifice import opening
 from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.show.report.open_loop_report import write_open_loop_report
 from lhpost6_pin.simulation.rehearse import rehearse, replay
 from lhpost6_pin.tuning.drives import Drive, circumstances, save_drive, scaled_drive
 
@@ -76,6 +78,21 @@ def paired(machine, target):
     b = np.copysign(-np.log1p(-np.abs(wanted)) / curve, wanted)
     apart.loc[{"actuator": names}] = a
     return both, record, record.assign(spool_position=apart, spool_position_b=(("time", "horizontal"), b))
+
+
+def test_a_replay_is_judged_by_the_axes_that_its_test_moves(tmp_path):
+    """Noise of 1 urad in yaw has an RRMSE of several hundred per cent, the motion in x one of 1 %."""
+    t = np.arange(2048) / 512
+    moved, noise = np.zeros((2048, 6)), 1e-6 * np.random.default_rng(0).standard_normal((2048, 6))
+    moved[:, 0] = 0.1 * np.sin(2 * np.pi * t)
+    facts = {"kind": "simulated", "test": "TX", "title": "TX", "specimen": "none", "machine": "m", "source": "s"}
+    channels = {"reference_displacement": moved, "platen_displacement": moved + noise}
+    measured = make_record(t, channels, {}, facts)
+    simulated = make_record(t, {"platen_displacement": 1.01 * moved + 4.0 * noise[::-1]}, {}, facts)
+    compared = compare(measured, simulated)
+    assert max(one.rrmse for one in compared) > 3.0
+    verdict, _ = write_open_loop_report(measured, simulated, compared, tmp_path / "report.html")
+    assert "displacement 1.00\N{NO-BREAK SPACE}% (x)" in verdict and "yaw" not in verdict
 
 
 def test_two_valves_that_open_apart_move_the_table_as_their_joint_spool_does(paired):

@@ -1,6 +1,7 @@
 """Run reports: complete, self-contained, safe against hostile names, light, and drawn by a real browser."""
 
 import base64
+import io
 import re
 import zlib
 from pathlib import Path
@@ -13,14 +14,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from page_cases import Reader, numbers
 from plotly.offline import get_plotlyjs
+from rich.console import Console
 from scipy.constants import g
 
 from lhpost6_pin.core.errors import RecordError, UnknownNameError
 from lhpost6_pin.data.metrics import QUANTITIES
+from lhpost6_pin.mechanics.specimen_modes import SpecimenMode
+from lhpost6_pin.show.report.interaction_section import interaction_blocks
 from lhpost6_pin.show.report.page import Page, Section, Table, bar, number, render_page, save_page, text
 from lhpost6_pin.show.report.plots import ACHIEVED, Row, Trace, envelope, time_figure
 from lhpost6_pin.show.report.run_report import RunSummary, lead_summary, write_run_report
 from lhpost6_pin.show.report.scales import SCALES, Scale, percent, scaled_number, shown_as
+from lhpost6_pin.show.terminal import _rich
+from lhpost6_pin.tuning.interaction import Cut, Interaction
 
 AXES = ["x", "y", "z", "roll", "pitch", "yaw"]
 ACTUATORS = ["H1", "H2", "H3", "H4", "V1", "V2", "V3", "V4", "V5", "V6"]
@@ -618,3 +624,31 @@ def test_no_column_of_a_table_is_cut_on_a_screen_of_1200_pixels(tmp_path):
         return await tab.evaluate("(s => s.scrollWidth - s.clientWidth)(document.querySelector('#wide .scroll'))")
 
     assert browse(tmp_path, Path(path).as_uri(), look, (1200, 800)) <= 0
+
+
+@pytest.mark.parametrize("width", [60, 80, 160])
+def test_no_column_of_a_table_is_lost_in_a_narrow_terminal(width):
+    """All words of a long last column are printed, though numbers before it would fill the line."""
+    words = [f"source{k}" for k in range(12)]
+    row = ("hydraulics.root_regularisation", "0.15, 0.25, 0.35, 0.45", "m/s2 | rad/s2", "assumed", " ".join(words))
+    table = Table("", ("quantity", "value", "unit", "evidence", "source"), [row])
+    console = Console(width=width, record=True, file=io.StringIO())
+    console.print(_rich(table, width))
+    printed = console.export_text()
+    columns = [line.split("\N{BOX DRAWINGS LIGHT VERTICAL}") for line in printed.splitlines() if line.startswith("│")]
+    assert "".join(line[-2] for line in columns).replace(" ", "") == "".join(words)
+    assert "".join(line[2] for line in columns).replace(" ", "") == row[1].replace(" ", "")
+
+
+@pytest.mark.parametrize("rigid", [True, False])
+def test_modes_of_a_specimen_are_listed_and_only_a_rigid_one_is_called_rigid(rigid):
+    modes = () if rigid else (SpecimenMode(1.6, 0.03, np.array([44e3, 0.0, 0.0, 0.0, 0.0, 0.0])),)
+    f = np.geomspace(0.1, 40.0, 50)
+    flat = np.ones((50, 6), complex)
+    cuts = {"with specimen": tuple(Cut(axis, 1.0, 1.0, 1.0, 1.0) for axis in AXES)}
+    found = Interaction(f, tuple(AXES), {"bare table": flat, "with specimen": flat}, cuts, modes, rigid)
+    blocks = interaction_blocks(make_record(), found)
+    captions = [block.caption for block in blocks if isinstance(block, Table)]
+    assert ("Modes of the specimen on a fixed base" in captions) is not rigid
+    assert any("at the specimen's periods" in caption for caption in captions) is not rigid
+    assert any("rigid" in block for block in blocks if isinstance(block, str)) is rigid

@@ -19,8 +19,13 @@ from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.valve_delay import delayed_spools
-from lhpost6_pin.simulation.rehearse import replay
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.show.run_results import notes_of_run, run_remarks, write_test_report
+from lhpost6_pin.show.tables import print_run
+from lhpost6_pin.simulation.divergence import amplified_mode
+from lhpost6_pin.simulation.rehearse import rehearse, replay
 from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, fastest_engine, simulate, simulate_many
+from lhpost6_pin.tuning.margins import without_dry_friction
 
 pytestmark = pytest.mark.long
 
@@ -199,6 +204,41 @@ def test_run_that_diverges_stops_and_names_a_remedy(plant, rest, engine):
     run = simulate(plant, loop, samples=n, scheme="euler", steps_per_second=SAMPLE_RATE, engine=engine)
     assert run.trouble is not None and len(run.time) < n
     assert np.all(np.isfinite(run.q))
+    assert run.diverged and "scheme euler at 2048 steps a second amplifies" in run.trouble
+    assert "take semi_implicit, or more steps (--rate)" in run.trouble and "left its stroke" not in run.trouble
+
+
+def test_a_mode_that_euler_amplifies_grows_in_simulation_as_it_says(plant, rest):
+    """Growth of the platen's speed over a second of Euler at 2048 Hz from a small push; Runge-Kutta amplifies none."""
+    smooth = make_plant(without_dry_friction(load_machine()))
+    _, growth = amplified_mode(smooth, "euler", SAMPLE_RATE)
+    start = find_equilibrium(smooth)
+    pushed = start.state._replace(v=1e-6 * np.ones(6))
+    spool = np.tile(start.spool, (SAMPLE_RATE, 1))
+    run = simulate(
+        smooth,
+        OpenLoop(spool, pushed),
+        samples=len(spool),
+        scheme="euler",
+        steps_per_second=SAMPLE_RATE,
+        engine="fused",
+    )
+    early, late = (np.sqrt(np.mean(part**2)) for part in (run.v[768:1280, 3], run.v[-512:, 3]))
+    seconds = (len(run.v) - 256 - 1024) / SAMPLE_RATE
+    assert np.log(late / early) / seconds == pytest.approx(growth, rel=0.1)  # another mode of roll beside it
+    assert (
+        amplified_mode(plant, "rk4", SAMPLE_RATE) == amplified_mode(plant, "semi_implicit", SAMPLE_RATE) == (0.0, 0.0)
+    )
+
+
+def test_a_run_that_diverges_prints_no_table_and_no_remark(plant, rest, capsys):
+    target = make_target(find_motion("sine", amplitude=0.05, cycles=1), axes="x")
+    options = {"scheme": "euler", "steps_per_second": SAMPLE_RATE, "engine": "fused"}
+    test = rehearse(load_machine(), target, load_controller("lhpost6"), attrs={}, **options)
+    assert test.run.diverged and not run_remarks(test.run)
+    print_run(test.run, write_test_report(test.run.plant, test.record, None, notes_of_run(test.run, [])))
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "diverged before" in printed and "Peak" not in printed and "capacity" not in printed
 
 
 @pytest.mark.parametrize(

@@ -4,15 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from machine_cases import plant_named
 from run_cases import with_tuning_numbers
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import SimulationError
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.simulation.motion_limits import fitting_scale
 from lhpost6_pin.tuning import identify as identify_module
 from lhpost6_pin.tuning import sine as module
-from lhpost6_pin.tuning.sine import sine_target, sine_test, with_cancellers
+from lhpost6_pin.tuning.sine import default_amplitude, sine_target, sine_test, with_cancellers
 
 pytestmark = pytest.mark.long
 
@@ -95,3 +97,13 @@ def test_frequencies_without_end_and_other_modes_are_refused():
     displacement = replace(load_controller("lhpost6"), mode="displacement")
     with pytest.raises(SimulationError, match="cancellers need a reference generator in acceleration mode"):
         sine_test(load_machine(), displacement, axis="x", amplitude=0.1, frequency=1.0)
+
+
+@pytest.mark.parametrize(
+    "name, axis, frequency", [("lhpost6", "x", 0.5), ("lhpost6", "yaw", 5.0), ("uniaxial", "x", 1.0)]
+)
+def test_an_amplitude_that_is_not_stated_is_half_of_what_fits(name, axis, frequency):
+    plant = plant_named(name)
+    amplitude = default_amplitude(plant, axis, frequency)
+    fits = amplitude * fitting_scale(plant, sine_target(axis, amplitude, frequency)[0])
+    assert 0.45 < amplitude / fits <= 0.5 + 1e-3  # rounded down to two digits, what fits to three

@@ -1,11 +1,15 @@
 """Stability of the controlled table: eigenvalues of its sampled closed loop against simulation and against margins."""
 
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from machine_cases import machine_named
+from scipy.linalg import eigvalsh
 
+from lhpost6_pin.cli.loop_check import loop_facts
 from lhpost6_pin.control import Notch, controlled, load_controller
 from lhpost6_pin.core.names import AXES, SAMPLE_RATE
 from lhpost6_pin.simulation.simulate import ClosedLoop, simulate
@@ -112,3 +116,47 @@ def test_a_tuned_loop_and_a_heavier_specimen_differ_in_the_interaction(tmp_path)
     roll = found.cuts[MOUNTED][found.axes.index("roll")]
     assert roll.peak > 1.4 and 25.0 < roll.peak_frequency <= 33.0  # the margin above is 1.8 dB at 33 Hz
     assert found.responses[BARE].shape == (len(found.frequency), 6)
+    assert found.rigid
+
+
+UPRIGHT = """<robot name="upright"><link name="foot"><inertial><mass value="10"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="hinge" type="continuous"><parent link="foot"/><child link="rod"/><axis xyz="0 1 0"/></joint>
+<link name="rod"><inertial><origin xyz="0 0 2"/><mass value="100"/>
+<inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
+
+
+def test_a_specimen_that_falls_over_is_called_so_and_not_the_loop(tmp_path):
+    """An upright point mass at 2 m grows by (g / l)^1/2; hanging, or locked, it does not."""
+    (tmp_path / "upright.urdf").write_text(UPRIGHT)
+    machine = MACHINE.with_specimen(tmp_path / "upright.urdf")
+    found = check_loop(controlled(machine, SHIPPED)[2])
+    assert found.specimen_growth == pytest.approx(np.sqrt(9.80665 / 2.0), rel=1e-4)  # differences; 5e-6 of inertia
+    assert found.verdict == "unstable" and found.summary.startswith("The specimen is unstable in this pose")
+    assert "--locked" in found.summary and "control loop" not in found.summary
+    assert "loop_remedy" not in loop_facts(found, None)
+    locked = check_loop(controlled(MACHINE.with_specimen(tmp_path / "upright.urdf", locked=True), SHIPPED)[2])
+    assert not locked.falls and locked.verdict == "stable"
+    (tmp_path / "hanging.urdf").write_text(UPRIGHT.replace('xyz="0 0 2"', 'xyz="0 0 -2"'))
+    assert not check_loop(controlled(MACHINE.with_specimen(tmp_path / "hanging.urdf"), SHIPPED)[2]).falls
+
+
+def test_modes_that_a_specimen_states_by_its_matrices_are_those_of_the_interaction():
+    """Frequencies by an eigenvalue problem of the file's own matrices; masses of all modes add up to what moves."""
+    machine = MACHINE.with_specimen("tall_column")
+    found = find_interaction(machine, SHIPPED)
+    entries = tomllib.loads(Path(machine.specimen.file).read_text())["matrices"]
+    mass, stiffness = entries["mass"]["value"], entries["stiffness"]["value"]
+    expected = np.sqrt(eigvalsh(stiffness, mass)) / (2 * np.pi)
+    np.testing.assert_allclose([mode.frequency for mode in found.modes], expected, rtol=1e-9)  # rounding
+    np.testing.assert_allclose([mode.damping for mode in found.modes], 0.03, rtol=1e-9)
+    total = sum(mode.mass for mode in found.modes)
+    np.testing.assert_allclose(total[:3], [44e3, 44e3, 0.0], rtol=1e-9, atol=1e-6)  # its matrices move no mass in z
+    assert not found.rigid
+
+
+def test_a_joint_about_the_vertical_is_neutral_and_its_specimen_stands(tmp_path):
+    """Nothing turns it either way; what derivatives by differences leave of that is no growth."""
+    text = UPRIGHT.replace('xyz="0 1 0"', 'xyz="0 0 1"').replace('xyz="0 0 2"', 'xyz="1 0 2"')
+    (tmp_path / "turning.urdf").write_text(text)
+    assert not check_loop(controlled(MACHINE.with_specimen(tmp_path / "turning.urdf"), SHIPPED)[2]).falls

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ..core.errors import SimulationError
+from ..core.errors import OutOfRangeError, SimulationError
 from ..core.names import AXES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
@@ -138,7 +138,9 @@ def replay(
 @command()
 def sine(
     machine: opt.SpecimenOptions,
-    amplitude: Annotated[float, typer.Option(min=0.0, help=r"Amplitude \[m, or rad].")] = 0.75,
+    amplitude: Annotated[
+        float | None, typer.Option(min=0.0, help=r"Amplitude \[m, or rad]; default: half of what fits.")
+    ] = None,
     frequency: Annotated[float, typer.Option(min=0.0, help="Frequency [Hz].")] = 0.5,
     axis: Annotated[
         str, typer.Option(help="Axis: x y z roll pitch or yaw.", autocompletion=completing(lambda: AXES))
@@ -155,15 +157,21 @@ def sine(
     from ..show.result_tables import print_sine
     from ..show.results import sine_entries
     from ..simulation.motion_limits import check_motion_limits
-    from ..tuning.sine import axis_row, sine_target, sine_test
+    from ..tuning.sine import axis_row, default_amplitude, rounded_down, sine_target, sine_test
 
     table = machine.load(valves)
     plant = make_plant(table)
     axis_row(plant, axis)
+    amplitude = default_amplitude(plant, axis, frequency) if amplitude is None else amplitude
     settings = opt.find_settings(controller, table)
     folder = opt.folder_for(out, f"sine_{axis}_{amplitude:g}_{frequency:g}Hz", "report.html")
     if not beyond:
-        check_motion_limits(plant, sine_target(axis, amplitude, frequency)[0])
+        try:
+            check_motion_limits(plant, sine_target(axis, amplitude, frequency)[0])
+        except OutOfRangeError as error:
+            fits = rounded_down(amplitude * (error.largest_scale or 0.0), 3)
+            hint = f". The largest --amplitude that fits is {fits:g}" if fits else ""
+            raise OutOfRangeError(f"{error}{hint}", error.largest_scale, error.exceeded) from None
     checked_loop(table, settings, machine)
     with progress_bar(f"sine in {axis} on {table.name}") as progress:
         found = sine_test(table, settings, axis=axis, amplitude=amplitude, frequency=frequency, progress=progress)

@@ -109,8 +109,8 @@ def capacity(
     from ..show.tables import print_modes
     from ..show.terminal import print_blocks
 
-    table = machine.load(valves)
-    found, files = machine_capacity(table), []
+    found, files = machine_capacity(machine.load(), valves), []
+    table = found.machine
     tables = capacity_tables(found)
     if out is not None:
         load = table.specimen.name if table.specimen else "bare"

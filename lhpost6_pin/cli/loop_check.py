@@ -41,7 +41,9 @@ def checked_loop(
         return None
     _, _, controller = controlled(table, settings)
     found = check_loop(controller)
-    if found.verdict != "stable":
+    if found.falls:
+        log.warning("%s", found.summary)
+    elif found.verdict != "stable":
         again = f", or repeat with --retune: `{repeating_command()} --retune`" if retune else ""
         log.warning("%s. Tune the controller for this table: `%s`%s", found.summary, _remedy(machine), again)
     return found
@@ -52,7 +54,7 @@ def loop_facts(found: "LoopCheck | None", machine: SpecimenOptions) -> dict[str,
     if found is None:
         return {}
     facts = {"loop": found.verdict, "loop_summary": found.summary}
-    return facts if found.verdict == "stable" else {**facts, "loop_remedy": _remedy(machine)}
+    return facts if found.falls or found.verdict == "stable" else {**facts, "loop_remedy": _remedy(machine)}
 
 
 def retuned(

@@ -29,7 +29,7 @@ from .user_specimen import REMOTE, load_user_specimen
 __all__ = ["Machine", "build_machine", "load_machine"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Machine(Structure):
     """A shake table as an ordered list of force effects on a platen.
 
@@ -38,6 +38,12 @@ class Machine(Structure):
 
     own_effects: tuple[Effect, ...] = ()
     specimen: Specimen | None = None
+
+    def __repr__(self) -> str:
+        """What the machine is, in a line; its numbers are in `parameters`."""
+        mounted = self.specimen.name if self.specimen else "none"
+        parts = f"{len(self.actuators)} actuators, {len(self.struts)} struts, {len(self.parameters)} numbers"
+        return f"Machine({self.name!r}: {parts}, specimen {mounted}; of {self.parameters.origin})"
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:

@@ -5,10 +5,13 @@ one flat mapping from a path such as ``platen.mass``, ``horizontal.area_a`` or `
 `machine.py` gives the paths their meaning.
 """
 
+import logging
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ..core.errors import ParameterError, UnknownNameError
 from ..core.files import find_shipped, read_toml, reason_of
@@ -27,8 +30,13 @@ __all__ = [
     "unusable",
 ]
 
+log = logging.getLogger(__name__)
+
 _GROUPS = ("kind", "component", "floor", "accelerometer", "estimates")
 """Sections that hold named sub-sections; the sub-section's name is the path's first part."""
+
+_FAR = 3.0
+"""Decades from what is stated beyond which a number without unit is doubted. Judgement, not physics."""
 
 _PREFIXED = ("accelerometer", "estimates")
 """Those whose sub-sections keep the group's name in front of theirs."""
@@ -101,7 +109,8 @@ def load_parameters(name_or_path: str | Path) -> Parameters:
 def override_parameters(parameters: Parameters, changes: Mapping[str, Any] | str | Path) -> Parameters:
     """Return a copy with some values replaced.
 
-    `changes` maps a path to a number or array in the file's unit, or to a table ``{value, unit, source, ...}`` of
+    `changes` maps a path to a number or array in the file's unit, which is SI (with a warning where it is far from what
+    is stated), or to a table ``{value, unit, source, ...}`` of
     which only value is needed; or it is the path of a small TOML file of such tables, with units. A component's path
     (``H3.seal_friction``) may be new if its kind has that key, and a number of an effect that is there
     (``effect.NAME.KEY``); anything else must exist. A file may add effects, ``[effect.NAME]``. Raises ParameterError
@@ -143,10 +152,23 @@ def _overridden(
             raise _unknown_parameter(key, (*quantities, *words))
         replaced.setdefault(key, base)
         quantities[key] = _changed(base, entry, key, origin)
+        if not isinstance(entry, Mapping | Quantity):
+            _doubt_unit(key, quantities[key].value, base)
         if in_a_file and base.unit != "1" and not (isinstance(entry, Mapping) and "unit" in entry):
             raise ParameterError(f"{key}: has no unit; write {{ value = ..., unit = '{base.unit}' }}")
     origins = f"{parameters.origin.removesuffix(f' + {origin}')} + {origin}"
     return Parameters(quantities, words, origins, effects, replaced)
+
+
+def _doubt_unit(key: str, value: Value, base: Quantity) -> None:
+    """Warn where a number without unit is far from the one stated, as one in another unit is."""
+    new, old = (np.abs(np.atleast_1d(x)) for x in (value, base.value))
+    known = (new > 0.0) & (old > 0.0)
+    if base.unit != "1" and np.any(np.abs(np.log10(new[known] / old[known])) > _FAR):
+        log.warning(
+            "%s: %r has no unit and is taken in %s, where %r is stated; write {'value': ..., 'unit': ...}",
+            *(key, value, base.unit, base.value),
+        )
 
 
 def _unknown_parameter(path: str, known: Iterable[str]) -> UnknownNameError:

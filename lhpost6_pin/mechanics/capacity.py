@@ -20,6 +20,9 @@ from .rigid_body import platen_inertia
 __all__ = ["Capacity", "FlowReading", "capacity_table", "flow_readings", "has_printed_capacity", "payload_table"]
 __all__ += ["actuator_speeds", "axis_speeds", "axis_travel"]
 
+ALL_VALVES = 2
+"""Servovalves of a horizontal actuator of the LHPOST6, all open in Table 2.2."""
+
 PER = {"m": "m/s", "rad": "rad/s"}
 
 
@@ -53,16 +56,19 @@ def has_printed_capacity(machine: Machine) -> bool:
     return "table_2_2.force_actuators" in machine.parameters
 
 
-def capacity_table(machine: Machine) -> tuple[Capacity, ...]:
+def capacity_table(machine: Machine, valves: int = 0) -> tuple[Capacity, ...]:
     """Peak forces, accelerations, velocities and strokes with what is mounted, beside what the machine file states.
 
-    Table 2.2 where the file has it, with all servovalves open as there, else its section `limits`. Forces and
-    accelerations with a specimen have nothing stated beside them.
+    Table 2.2 where the file has it, with all servovalves open as there, else its section `limits`. With a number of
+    `valves` open the velocities are those of so many. Forces and accelerations with a specimen, and velocities with
+    fewer servovalves than in Table 2.2, have nothing stated beside them.
     """
     plant, printed = lock_joints(make_plant(machine)), has_printed_capacity(machine)
-    open_valves = machine.with_valves(2) if printed else machine
+    open_valves = machine.with_valves(valves or (ALL_VALVES if printed else 0))
     rows = [*_forces(plant), *_accelerations(plant), *_speeds(open_valves), *_travel(plant)]
     stated = _stated(machine)
+    if printed and valves not in (0, ALL_VALVES):
+        stated = {name: value for name, value in stated.items() if "velocity" not in name}
     return tuple(row._replace(printed=stated.get(row.name)) for row in rows)
 
 
@@ -71,7 +77,7 @@ def payload_table(machine: Machine) -> tuple[Capacity, ...]:
     par = machine.parameters
     if "table_2_2_payload.weight" not in par:
         return ()
-    bare = machine.with_valves(2)
+    bare = machine.with_valves(ALL_VALVES)
     plant = with_payload(make_plant(bare), par.number("table_2_2_payload.weight"))
     x, y, down = par.vector("table_2_2_payload.acceleration")
     actuators = par.vector("table_2_2_payload.acceleration_actuators")
@@ -89,7 +95,7 @@ def flow_readings(machine: Machine) -> tuple[FlowReading, ...]:
     """Evidence on the two readings of Eq. 4-2: peak velocities by each beside those stated, and one measured."""
     if not has_printed_capacity(machine):
         return ()
-    par, bare = machine.parameters, machine.with_valves(2)
+    par, bare = machine.parameters, machine.with_valves(ALL_VALVES)
     plants = [make_plant(bare.with_flow_reading(word)) for word in FLOW_READINGS]
     speeds = [axis_speeds(plant).min(axis=1) for plant in plants]
     limits = machine.limits.velocity

@@ -23,6 +23,7 @@ from .specimen_joints import specimen_mass
 __all__ = ["make_motion_check"]
 
 OVERTURNING = ("roll", "pitch")
+OF_SPEED = "of the unloaded velocity of its valves"
 
 
 def make_motion_check(plant: Plant) -> MotionCheck:
@@ -32,7 +33,8 @@ def make_motion_check(plant: Plant) -> MotionCheck:
     Raises SimulationError or OutOfRangeError if the actuators cannot hold what is mounted at rest.
     """
     machine = plant.machine
-    speeds = (1.0 - machine.limits.valve_reserve) * actuator_speeds(plant)
+    reserve = machine.limits.valve_reserve
+    speeds, of_speed = (1.0 - reserve) * actuator_speeds(plant), f"{OF_SPEED} less the reserve of {100 * reserve:g} %"
     strokes, names = np.array([a.stroke for a in machine.actuators]), machine.actuator_names
     strength, rest = stated_strength(machine.parameters), rest_forces(plant)
     _refuse_unheld(plant, rest.share[0])
@@ -44,25 +46,25 @@ def make_motion_check(plant: Plant) -> MotionCheck:
         moved, rate = moved[:, : plant.spools], rate[:, : plant.spools]
         fed = np.where(rate >= 0.0, rate / speeds[:, 0], -rate / speeds[:, 1])
         found = [
-            Demand("actuator velocity", names, fed, "of the unloaded velocity of its valves"),
+            Demand("actuator velocity", names, fed, of_speed if reserve else OF_SPEED),
             Demand("actuator stroke", names, np.abs(moved) / strokes, "of its stroke"),
         ]
         needed = required_forces(plant, PlatenMotion(displacement, velocity, acceleration))
         beyond, at = needed.share - rest.share, rest.share[0]
-        force = span.middle + span.half * needed.share
         push, pull = np.maximum(beyond, 0.0) / (1.0 - at), np.maximum(-beyond, 0.0) / (1.0 + at)
-        found.append(Demand("actuator push", names, push, "of its push beyond rest", force, "N"))
+        more, less = span.half * np.maximum(beyond, 0.0), span.half * np.maximum(-beyond, 0.0)  # of force, from rest
+        found.append(Demand("actuator push", names, push, "of its push beyond rest", more, "N"))
         for some, quantity, of in (
             (~single, "actuator pull", "of its pull beyond rest"),
             (single, "actuator unloading", "of its force at rest down to its least chamber pressure"),
         ):
             if some.any():
                 these = [name for name, own in zip(names, some, strict=True) if own]
-                found.append(Demand(quantity, these, pull[:, some], of, force[:, some], "N"))
+                found.append(Demand(quantity, these, pull[:, some], of, less[:, some], "N"))
         in_space = np.einsum("nij,nj->ni", needed.turn, needed.wrench[:, :3])
-        more = needed.wrench - rest.wrench
-        found += _on_parts(plant, strength, displacement, in_space, more[:, 3:])
-        return [*found, *_along_axes(plant, wrench_at_bearings(plant, more), along)]
+        wrench = needed.wrench - rest.wrench
+        found += _on_parts(plant, strength, displacement, in_space, wrench[:, 3:])
+        return [*found, *_along_axes(plant, wrench_at_bearings(plant, wrench), along)]
 
     return check
 

@@ -24,6 +24,7 @@ _AXIS_NAMES |= dict.fromkeys(("ew", "e-w", "east"), "x") | dict.fromkeys(("ns", 
 _AXIS_NAMES |= dict.fromkeys(("ud", "u-d", "up"), "z")
 _COLUMN = re.compile(
     rf"(?:[ad]|acc)?_?(?P<axis>{'|'.join(sorted(_AXIS_NAMES, key=len, reverse=True))})"
+    r"(?:[\s_]+(?:acc(?:el(?:eration)?)?|disp(?:l(?:acement)?)?))?"  # the quantity, which the unit gives
     r"(?:[\s_]*[\[(](?P<bracketed>[^\])]*)[\])]|[_ ](?P<suffix>.+))?",
     re.I,
 )
@@ -49,7 +50,7 @@ def read_csv(text: str, where: str, **stated: Unpack[Stated]) -> list[Component]
     """Components of a CSV file.
 
     The header row names the columns: a time column (`time`, `t`, `time_s`, `time [ms]`) and one for each axis
-    with its unit, such as `x_m_s2`, `ax_g`, `roll_rad` or `z [mm]`; all must be accelerations or all
+    with its unit, such as `x_m_s2`, `ax_g`, `roll_rad`, `z [mm]` or `X Accel [g]`; all must be accelerations or all
     displacements. `channels` maps axis to column name (or number) where the names differ, `units` gives one unit for
     all or one for each axis, `time_step` [s] stands in for a missing time column. Columns are separated by
     commas, semicolons, tabs or blanks.

@@ -11,6 +11,7 @@ the product rule, (w d)' and (w d)'', so they stay consistent.
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -128,8 +129,8 @@ def make_target(
     low_pass = settings["low_pass"] if low_pass is None else low_pass
     pad = settings["pad"] if pad is None else pad
     pairs = axes_map(",".join(AXES) if axes is None else axes)
-    if not np.isfinite(scale):
-        raise MotionError(f"{motion.name}: scale is {scale}; give a finite number")
+    if not (isinstance(scale, Real) and np.isfinite(scale)):
+        raise MotionError(f"{motion.name}: scale is {scale!r}; give a finite number")
     if not (0 <= high_pass < low_pass < rate / 2 and pad > 0):
         raise MotionError(
             f"{motion.name}: high-pass {high_pass:g} Hz, low-pass {low_pass:g} Hz and {pad:g} s of padding; "

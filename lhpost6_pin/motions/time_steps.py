@@ -6,14 +6,18 @@ from ..core.errors import MotionError
 
 __all__ = ["even_out", "uniform_step"]
 
-_UNIFORM = 0.01  # a step may differ from the mean by this part of it: room for times printed with few digits
+_UNIFORM = 0.01  # a step may differ from the median by this part of it: room for times printed with few digits
 
 
 def uniform_step(time: np.ndarray, where: str, stated: float | None = None) -> float:
-    """Step [s] of uniform times (n,); raises MotionError for other times, or where the `stated` step [s] differs."""
+    """Step [s] of uniform times (n,); raises MotionError for other times, or where the `stated` step [s] differs.
+
+    Steps are compared with their median, which a gap does not move.
+    """
     with np.errstate(over="ignore", invalid="ignore"):  # absurd times are caught below
         mean = (time[-1] - time[0]) / (len(time) - 1)
-        uneven = ~(np.abs(np.diff(time) - mean) <= _UNIFORM * mean)
+        usual = float(np.median(np.diff(time)))
+        uneven = ~(np.abs(np.diff(time) - usual) <= _UNIFORM * usual)
     if not (np.isfinite(mean) and mean > 0):
         raise MotionError(f"{where}: time runs from {time[0]:g} s to {time[-1]:g} s; it must increase")
     if uneven.any():
@@ -21,7 +25,7 @@ def uniform_step(time: np.ndarray, where: str, stated: float | None = None) -> f
         here, before = float(time[sample]), float(time[sample - 1])
         raise MotionError(
             f"{where}: time step before sample {sample} (t = {here:g} s) is {here - before:g} s, "
-            f"the mean is {mean:g} s; resample the record to a uniform step"
+            f"the median is {usual:g} s; resample the record to a uniform step"
         )
     if stated is not None and not abs(stated - mean) <= _UNIFORM * mean:
         raise MotionError(f"{where}: its time column has steps of {mean:g} s, not {stated:g} s; leave --dt out")

@@ -32,6 +32,12 @@ SHOWN = {"m/s2": SCALES["acceleration"], "rad": SCALES["rotation"], "N": SCALES[
 SHOWN |= {"rad/s": SCALES["rotation velocity"], "rad/s2": SCALES["rotation acceleration"]}
 
 
+_TURNS = (
+    " The two differ in roll, pitch and yaw: “peak acceleration” turns the platen about B, its centre of gravity, the "
+    "limits of sinusoidal motion about C, the point that motions command, so that B accelerates sideways, too."
+)
+
+
 class MachineCapacity(NamedTuple):
     """Capacity of a machine with what is mounted."""
 
@@ -40,14 +46,20 @@ class MachineCapacity(NamedTuple):
     payload: tuple[Capacity, ...]  # with the payload of Table 2.2
     readings: tuple[FlowReading, ...]
     loads: tuple[Load, ...]  # bare, and with the specimen or the payload of Table 2.2
+    valves: int = 0  # servovalves of an actuator asked for; 0: as in the file, and all beside Table 2.2
 
 
-def machine_capacity(machine: Machine) -> MachineCapacity:
-    """Capacity of a machine; raises SimulationError if it cannot hold its specimen at rest."""
+def machine_capacity(machine: Machine, valves: int = 0) -> MachineCapacity:
+    """Capacity of a machine, with a number of `valves` open or as in its file.
+
+    Raises SimulationError if it cannot hold its specimen at rest.
+    """
+    machine = machine.with_valves(valves)
     bare = machine.specimen is None
     payload = payload_table(machine) if bare else ()
     readings = flow_readings(machine) if bare else ()
-    return MachineCapacity(machine, capacity_table(machine), payload, readings, performance_loads(machine))
+    rows, loads = capacity_table(machine, valves), performance_loads(machine)
+    return MachineCapacity(machine, rows, payload, readings, loads, valves)
 
 
 def judged(plant: Plant, record: xr.Dataset) -> tuple[tuple[Peak, ...], str]:
@@ -70,14 +82,16 @@ def judged(plant: Plant, record: xr.Dataset) -> tuple[tuple[Peak, ...], str]:
 
 def performance_loads(machine: Machine, *, payload: bool = True) -> tuple[Load, ...]:
     """Performance of the bare table, and with its specimen or, bare, with the payload that Table 2.2 states."""
-    plant, band = make_plant(machine), machine.limits.bandwidth
+    plant, band, valves = make_plant(machine), machine.limits.bandwidth, _open_valves(machine)
     if machine.specimen is not None:
         bare = table_performance(make_plant(machine.without_specimen()))
-        return Load("bare table", bare, band), Load(machine.specimen.name, table_performance(plant), band)
-    loads = [Load("bare table", table_performance(plant), band)]
+        loaded = Load(machine.specimen.name, table_performance(plant), band, valves)
+        return Load("bare table", bare, band, valves), loaded
+    loads = [Load("bare table", table_performance(plant), band, valves)]
     if payload and "table_2_2_payload.weight" in machine.parameters:
         weight = machine.parameters.number("table_2_2_payload.weight")
-        loads.append(Load(f"payload of {weight / 1e6:g} MN", table_performance(with_payload(plant, weight)), band))
+        performance = table_performance(with_payload(plant, weight))
+        loads.append(Load(f"payload of {weight / 1e6:g} MN", performance, band, valves))
     return tuple(loads)
 
 
@@ -86,7 +100,8 @@ def capacity_tables(found: MachineCapacity) -> list[Table]:
     machine = found.machine
     load = "bare table" if machine.specimen is None else f"with {machine.specimen.name}"
     stated = "Table 2.2" if has_printed_capacity(machine) else "stated"
-    valves = "all servovalves open" if has_printed_capacity(machine) else "servovalves as in its file"
+    everything = has_printed_capacity(machine) and not found.valves
+    valves = "all servovalves open" if everything else _open_valves(machine)
     header = ("capacity", "model", stated, "unit", "deviation", "how")
     tables = [Table(f"Capacity, {load}, {valves}", header, [_row(line) for line in found.rows])]
     if found.payload:
@@ -109,6 +124,13 @@ def capacity_tables(found: MachineCapacity) -> list[Table]:
     return [*tables, performance_table(found.loads)]
 
 
+def _open_valves(machine: Machine) -> str:
+    """How many servovalves are open, in words; those of the double-acting actuators, of which it can be chosen."""
+    counts = {a.kind: a.valves for a in machine.actuators if a.area_b is not None}
+    words = (f"{n} servovalve{'s' * (n > 1)} open on each {kind} actuator" for kind, n in counts.items())
+    return ", ".join(words) or "servovalves as in its file"
+
+
 def judged_by(found: MachineCapacity) -> str:
     """What accelerations a motion is judged by, and how those that the actuators alone give belong to them."""
     load = found.loads[0 if found.machine.specimen is None else -1]
@@ -119,7 +141,9 @@ def judged_by(found: MachineCapacity) -> str:
     words = [f"{axis} {b.value:.3g} m/s² ({_shown(b.value, SHOWN['m/s2'])} g, {b.by})" for axis, b in bounds]
     return (
         f"{rows}: what the forces of the actuators alone give. A motion is judged by the least of the limits of "
-        f"sinusoidal motion; {load.name}: {', '.join(words)}." + source * any("stated" in b.by for _, b in bounds)
+        f"sinusoidal motion; {load.name}: {', '.join(words)}."
+        + source * any("stated" in b.by for _, b in bounds)
+        + _TURNS * (found.machine.motion == "free")
     )
 
 

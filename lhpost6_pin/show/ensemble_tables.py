@@ -4,8 +4,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from ..studies.exceedance import Exceedance
-from ..studies.summary import EnsembleSummary, ImportanceOf, Spread
+from ..studies.summary import Configuration, EnsembleSummary, ImportanceOf, Spread
 from .report.page import Table, number
 from .report.scales import SCALES, Scale
 from .terminal import print_blocks
@@ -23,17 +25,28 @@ def ensemble_verdict(found: EnsembleSummary) -> str:
     words.append(f", {found.stopped} stopped on the way" if found.stopped else "")
     sentences = ["".join(words) + "."]
     many = len(found.configurations) > 1
-    if many:
-        sentences.append(f"The worst of {len(found.configurations)} configurations:")
     if found.configurations:
-        one = min(
-            found.configurations, key=lambda own: (own.exceedances[0].risk_scale, -own.exceedances[0].share.max())
-        )
-        which = f" ({one.motion}, specimen {one.specimen}, controller {one.controller})" if many else ""
+        worst = [own for own in found.configurations if _rank(own) == min(map(_rank, found.configurations))]
+        one, alike = worst[0], len(worst) == len(found.configurations)
+        if many and alike:
+            sentences.append(f"All {len(worst)} configurations alike:")
+        elif many:
+            also = f", {len(worst)} of them alike" if len(worst) > 1 else ""
+            sentences.append(f"The worst of {len(found.configurations)} configurations{also}:")
+        names = "; ".join(f"{own.motion}, specimen {own.specimen}, controller {own.controller}" for own in worst)
+        which = f" ({names})" if many and not alike else ""
         sentences.append(f"{_risk_words(one.exceedances[0], found)}{which}.")
     if found.configurations and "strengths" not in found.groups:
         sentences.append("Strengths and the unloading of actuators were not evaluated (group strengths).")
+    for loop in found.loops:
+        sentences.append(f"With specimen {loop.specimen}, controller {loop.controller}: {loop.summary}.")
     return " ".join(sentences)
+
+
+def _rank(own: Configuration) -> tuple[float, ...]:
+    """Order of configurations, the worst first: the scale of the stated risk, then the shares at the scales."""
+    first = own.exceedances[0]
+    return (np.nan_to_num(first.risk_scale, nan=np.inf), *(-np.nan_to_num(first.share)).tolist())
 
 
 def _risk_words(one: Exceedance, found: EnsembleSummary) -> str:
@@ -50,6 +63,8 @@ def _risk_words(one: Exceedance, found: EnsembleSummary) -> str:
         return f"{few}, the largest run: the risk there is at most {_percent(one.high[-1])}"
     if one.where == "at or below the smallest run":
         return f"{risk} or more at scale {found.scales[0]:g} already, the smallest run"
+    if one.risk_after:
+        return f"{risk} between the scales {one.risk_after:.3g} and {one.risk_scale:.3g}"
     low = f"{one.risk_low:.3g} to " if one.risk_low else "too few machines for a lower bound; up to "
     return f"{risk} at scale {one.risk_scale:.3g} ({low}{_end(one.risk_high)})"
 
@@ -68,6 +83,7 @@ def risk_table(found: EnsembleSummary) -> Table:
                 for s, a, b in zip(one.share, one.low, one.high, strict=True)
             )
             below = "≤ " if one.where == "at or below the smallest run" else ""
+            below = f"{one.risk_after:.3g} to " if one.risk_after else below
             scale = below + _end(one.risk_scale) if one.where != "unknown" else "–"
             rows.append((one.limit, *(str(own[k]) for k in varying), scale, len(one.critical), *shares))
     names = ("Motion", "Specimen", "Controller")
@@ -81,7 +97,7 @@ def _percent(share: float) -> str:
 
 
 def spread_table(spreads: Sequence[Spread]) -> Table:
-    """Return quantiles of each result by motion, scale, specimen and controller."""
+    """Return quantiles of each result by motion, scale, specimen and controller; one scale stands in the title."""
     rows, shown = [], _varying(spreads)
     for one in spreads:
         scale = _SCALES.get(one.units, Scale(1.0, one.units))
@@ -89,7 +105,9 @@ def spread_table(spreads: Sequence[Spread]) -> Table:
         ends = f"{low} to {high}", _shown(one.most, scale)
         rows.append((one.result, *_where(one, shown), scale.unit, middle, *ends, one.runs))
     header = ("Result", *shown, "Unit", "Median", "5 to 95 %", "Largest", "Runs")
-    return Table("Results", header, rows)
+    scales = {one.scale for one in spreads}
+    at = f" at scale {scales.pop():g}" if len(scales) == 1 else ""
+    return Table(f"Results{at}", header, rows)
 
 
 def _varying(rows: Sequence[Spread | ImportanceOf]) -> list[str]:

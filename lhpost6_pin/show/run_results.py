@@ -20,7 +20,9 @@ __all__ = ["notes_of_run", "run_remarks", "write_test_report"]
 
 
 def run_remarks(run: Run) -> list[str]:
-    """Remarks on a run: joints of the specimen beyond their limits, low pressures, ends of strokes."""
+    """Remarks on a run that has not diverged: joints beyond their limits, low pressures, ends of strokes."""
+    if run.diverged:
+        return []
     return [*joints_beyond(run.plant, run.time, run.q), *run_doubts(run)]
 
 

@@ -179,8 +179,10 @@ def print_summary(summary: "RunSummary") -> None:
 
 
 def print_run(run: "Run", summary: "RunSummary | None") -> None:
-    """Print the summary of a run, its duration, scheme and rate."""
-    if summary is not None:
+    """Print the summary of a run, its duration, scheme and rate; of one that diverged no numbers."""
+    if summary is not None and run.diverged:
+        print_blocks(Text(summary.verdict, style="bold"))
+    elif summary is not None:
         print_summary(summary)
     seconds = run.time[-1] + 1 / run.rate
     print_blocks(f"{seconds:.2f} s of motion, {run.scheme} at {run.steps_per_second} steps a second")

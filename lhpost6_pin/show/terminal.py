@@ -2,6 +2,7 @@
 
 import re
 
+from rich.console import JustifyMethod
 from rich.markup import escape
 from rich.table import Table as RichTable
 from rich.text import Text
@@ -11,6 +12,9 @@ from .report.page import Figure, Markup, Table, plain_text
 
 __all__ = ["print_blocks"]
 
+_PADDING, _LEAST = 3, 12
+"""Characters about a column, and the least of one that wraps."""
+
 _NUMBER = re.compile(r"^$|[<~!▲+±−–-]|\d")
 
 
@@ -19,22 +23,29 @@ def print_blocks(*blocks: str | Text | Table | Figure) -> None:
     console = make_console()
     for block in blocks:
         if isinstance(block, Table):
-            console.print(_rich(block))
+            console.print(_rich(block, console.width))
         elif isinstance(block, str | Text) and block:
             words = plain_text(block) if isinstance(block, Markup) else block
             console.print(words, markup=False, highlight=False, soft_wrap=True)
 
 
-def _rich(table: Table) -> RichTable:
-    """The table with columns of numbers flush right."""
+def _rich(table: Table, width: int) -> RichTable:
+    """The table with columns of numbers flush right; on a narrow terminal all columns wrap, so that none is lost."""
     made = RichTable(title=escape(table.caption) or None, title_justify="left")
     cells = [[cell if isinstance(cell, Text) else escape(plain_text(cell)) for cell in row] for row in table.rows]
-    for n, heading in enumerate(table.header):
+    columns = []
+    for n in range(len(table.header)):
         texts = [str(row[n]) for row in cells]
         right = n > 0 and all(map(_NUMBER.match, texts))
-        whole = right or any(isinstance(row[n], Text) for row in cells)
-        width = max(map(len, texts), default=0) if whole else None  # headings wrap, numbers and styled words do not
-        made.add_column(escape(heading), justify="right" if right else "left", no_wrap=n == 0, min_width=width)
+        whole = n == 0 or right or any(isinstance(row[n], Text) for row in cells)
+        longest = max(map(len, texts), default=0)
+        columns.append((right, whole, longest if whole else min(longest, _LEAST)))
+    # headings wrap, numbers, styled words and the first column do not, unless nothing is left for the others
+    fits = sum(_PADDING + size for _, _, size in columns) < width
+    for n, (heading, (right, whole, longest)) in enumerate(zip(table.header, columns, strict=True)):
+        size = longest if n and whole and fits else None
+        justify: JustifyMethod = "right" if right else "left"
+        made.add_column(escape(heading), justify=justify, no_wrap=n == 0 and fits, min_width=size, overflow="fold")
     for row in cells:
         made.add_row(*row)
     return made

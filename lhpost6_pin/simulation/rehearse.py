@@ -109,6 +109,10 @@ def loop_for(
         controller = make_controller(plant, rest, settings)
         drive = controller.drive_for(*motion) if drive is None else drive
         return ClosedLoop(controller, drive if inverse is None else apply_inverse(inverse, drive), rest)
+    if not all(callable(getattr(settings, method, None)) for method in ("init", "step")):
+        raise SimulationError(
+            f"settings are {settings!r}; give those of load_controller(...), or a controller with init and step"
+        )
     if drive is not None or inverse is not None:
         raise SimulationError(
             "a drive or an inverse is an input of the 469D's reference generators; a controller of your own has none"

@@ -27,6 +27,7 @@ from ..mechanics.schemes import A, V
 from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import Workspace, make_workspace
 from .coupling import Coupling, CouplingOptions, CouplingResult, make_coupling
+from .divergence import scheme_divergence
 from .engine_fused import Log, Signals, Span, log_packed, run_fused
 from .engine_pinocchio import make_stepper
 from .loops import ClosedLoop, Loop, OpenLoop, PluggedLoop, check_closed_loop, check_options, check_run
@@ -62,6 +63,7 @@ class Run:
     clipped: int
     trouble: str | None
     coupling: CouplingResult | None = None  # of a coupled specimen
+    diverged: bool = False  # by its scheme (`divergence`): its numbers mean nothing
 
     @property
     def state(self) -> State:
@@ -119,8 +121,11 @@ def simulate(
     exchanged = coupled.result() if coupled else None
     kept = -(-(done if exchanged is None else min(done, len(exchanged.wrench))) // record_every)
     trouble = coupled.trouble if coupled else None
+    diverged = ""
+    if status and status != _STOPPED and trouble is None:
+        diverged = scheme_divergence(plant, scheme, steps_per_second, done / SAMPLE_RATE)
     if status and trouble is None:
-        trouble = diagnosis(plant, status, done / SAMPLE_RATE, scheme, steps_per_second)
+        trouble = diverged or diagnosis(plant, status, done / SAMPLE_RATE, scheme, steps_per_second)
     if trouble:
         log.warning(trouble)
     if clipped:
@@ -141,6 +146,7 @@ def simulate(
         clipped=clipped,
         trouble=trouble,
         coupling=exchanged,
+        diverged=bool(diverged),
     )
 
 

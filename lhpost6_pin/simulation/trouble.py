@@ -12,6 +12,7 @@ from ..machine.components import Actuator
 from ..mechanics.plant import Plant
 from ..mechanics.pose import platen_motion
 from ..mechanics.strokes import stroke_ends
+from .divergence import scheme_divergence
 from .simulate import Run
 
 __all__ = ["EmptyChambers", "pressure_trouble", "run_doubts", "with_pressure_trouble"]
@@ -52,10 +53,17 @@ class _Low(NamedTuple):
 
 
 def with_pressure_trouble(run: Run) -> Run:
-    """The run, with its `pressure_trouble`, which is logged; it stands before trouble that the run has already."""
-    trouble = pressure_trouble(run)
-    if not trouble:
+    """The run, with its `pressure_trouble`, which is logged; it stands before trouble that the run has already.
+
+    Pressures of a run that its scheme made diverge say nothing; such a run may not have stopped.
+    """
+    first = None if run.diverged else _first_empty(run)
+    if first is None:
         return run
+    if run.trouble is None and (why := scheme_divergence(run.plant, run.scheme, run.steps_per_second, first.time)):
+        log.warning("the run %s", why)
+        return replace(run, trouble=why, diverged=True)
+    trouble = _unphysical(first.chamber, first.time)
     log.warning("the run %s", trouble)
     return replace(run, trouble=trouble if run.trouble is None else f"{trouble}; then: {run.trouble}")
 
@@ -65,8 +73,13 @@ def pressure_trouble(run: Run) -> str:
 
     Oil bears no tension: it cavitates, and a bearing actuator with an empty chamber loses contact with the platen.
     """
-    first = min(_lowest(run, 0.0), key=lambda one: one.time, default=None)
+    first = _first_empty(run)
     return "" if first is None else _unphysical(first.chamber, first.time)
+
+
+def _first_empty(run: Run) -> _Low | None:
+    """The chamber whose pressure fell below zero first."""
+    return min(_lowest(run, 0.0), key=lambda one: one.time, default=None)
 
 
 class EmptyChambers:

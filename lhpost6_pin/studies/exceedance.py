@@ -35,6 +35,7 @@ class Exceedance(NamedTuple):
     risk_low: float  # of its interval; 0: with so few machines it has no lower bound
     risk_high: float
     where: Where  # the scale of that share
+    risk_after: float = 0.0  # the scale run before it, where that of the risk is known to lie between both only; else 0
 
 
 def critical_scales(use: Array, scales: Array) -> Array:
@@ -72,6 +73,7 @@ def exceedance(limit: str, critical: Array, scales: Array, *, level: float, conf
     at = float(critical[max(1, int(np.ceil(level * n))) - 1])
     first, last = int(binom.ppf(tail, n, level)), int(binom.ppf(1.0 - tail, n, level)) + 1
     where: Where = "beyond the largest run" if np.isinf(at) else "within"
+    before = scales[(scales < at) & np.isin(at, scales)]  # reached at a scale that was run, not interpolated: saturated
     return Exceedance(
         limit,
         critical,
@@ -82,6 +84,7 @@ def exceedance(limit: str, critical: Array, scales: Array, *, level: float, conf
         float(critical[first - 1]) if first >= 1 else 0.0,
         float(critical[last - 1]) if last <= n else float("inf"),
         "at or below the smallest run" if at <= scales[0] else where,
+        float(before[-1]) if len(before) else 0.0,
     )
 
 

@@ -20,6 +20,7 @@ import xarray as xr
 from ..core.arrays import Array
 from ..core.errors import ParameterError, RecordError
 from ..core.files import write_whole
+from .loops import LOOP_DIMENSIONS, loops_of
 from .plan import DIMENSIONS, Block, EnsemblePlan
 from .quantities import Variable, variables_of
 from .runs import FACTS, labels_of
@@ -153,6 +154,9 @@ def _describe(file: Any, plan: EnsemblePlan, digest: str) -> None:
     for name, (dims, variable) in _TARGET.items():
         if name == "duration" or "psa" in file.variables:
             _variable(file, name, (*dims, *variable.dims), variable, dtype="f8", fillvalue=np.nan)
+    for name, texts in loops_of(plan).items():
+        about = Variable((), "1", f"{name.replace('_', ' ')} of the machine as stated")
+        _variable(file, name, LOOP_DIMENSIONS, about, dtype=_TEXT, data=texts)
     parameters = plan.draws.parameters
     if not parameters:
         return

@@ -15,8 +15,8 @@ from .importance import Importance, importances
 from .plan import DIMENSIONS
 from .quantities import DECIDING
 
-__all__ = ["CONFIGURATION", "QUANTILES", "Configuration", "EnsembleSummary", "ImportanceOf", "Spread", "places_of"]
-__all__ += ["summarise"]
+__all__ = ["CONFIGURATION", "QUANTILES", "Configuration", "EnsembleSummary", "ImportanceOf", "LoopOf", "Spread"]
+__all__ += ["places_of", "summarise"]
 
 CONFIGURATION = ("motion", "specimen", "controller")
 """Dimensions of a configuration, whose risk is over scales and machines."""
@@ -71,6 +71,15 @@ class Configuration(NamedTuple):
     exceedances: tuple[Exceedance, ...]  # of any limit, then of each
 
 
+class LoopOf(NamedTuple):
+    """A control loop that is unstable, or has thin margins, on the machine as stated."""
+
+    specimen: str
+    controller: str
+    verdict: str
+    summary: str
+
+
 class EnsembleSummary(NamedTuple):
     """Summary of an ensemble."""
 
@@ -87,6 +96,7 @@ class EnsembleSummary(NamedTuple):
     importance: tuple[ImportanceOf, ...]
     no_importance: str  # why none is estimated; empty if it is
     level: float  # risk whose scale is stated
+    loops: tuple[LoopOf, ...] = ()  # those that are not stable
 
     @property
     def shown_scale(self) -> float:
@@ -128,7 +138,18 @@ def summarise(results: xr.Dataset, numbers: Parameters) -> EnsembleSummary:
         importance=importance,
         no_importance=why,
         level=numbers.number("risk.level"),
+        loops=tuple(_loops(results)),
     )
+
+
+def _loops(results: xr.Dataset) -> Iterator[LoopOf]:
+    """Loops that are not stable."""
+    if "loop" not in results:
+        return
+    for place, (specimen, controller) in places_of(results, "specimen", "controller"):
+        verdict = str(results["loop"].values[place])
+        if verdict not in ("", "stable"):
+            yield LoopOf(specimen, controller, verdict, str(results["loop_summary"].values[place]))
 
 
 def _counted(words: Array) -> dict[str, int]:

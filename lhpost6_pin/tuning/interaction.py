@@ -42,6 +42,7 @@ class Interaction:
     responses: Mapping[str, Complex]  # (m, n) by what they are of; the bare table's first, then the run's own
     cuts: Mapping[str, tuple[Cut, ...]]  # of every response but the bare table's
     modes: tuple[SpecimenMode, ...]
+    rigid: bool  # whether nothing of the specimen moves relative to the platen
 
 
 def find_interaction(
@@ -72,7 +73,7 @@ def find_interaction(
     axes = tuple(AXES[k] for k in plant.axes)
     inside = f <= high
     cuts = {n: _cuts(f[inside], axes, r[inside], responses[BARE][inside]) for n, r in responses.items() if n != BARE}
-    return Interaction(f, axes, responses, cuts, specimen_modes(plant))
+    return Interaction(f, axes, responses, cuts, specimen_modes(plant), not plant.flexible)
 
 
 BARE, MOUNTED = "bare table", "with specimen"

@@ -11,6 +11,7 @@ amplitude and phase (APC); the others cancel the harmonics due to friction, valv
 """
 
 from dataclasses import dataclass
+from decimal import ROUND_DOWN, Context
 from typing import Any
 
 import numpy as np
@@ -28,12 +29,22 @@ from ..machine.machine import Machine
 from ..mechanics.plant import Plant
 from ..mechanics.pose import platen_motion
 from ..motions import Target, find_motion, make_target, motion_options, smooth_step
+from ..simulation.motion_limits import fitting_scale
 from ..simulation.simulate import ClosedLoop, Run, fastest_engine, simulate
 from ..simulation.trouble import with_pressure_trouble
 from .identify import section, tuning_numbers
 from .margins import expected_response, make_loop_model
 
-__all__ = ["SineResult", "SineTest", "axis_row", "sine_target", "sine_test", "with_cancellers"]
+__all__ = [
+    "SineResult",
+    "SineTest",
+    "axis_row",
+    "default_amplitude",
+    "rounded_down",
+    "sine_target",
+    "sine_test",
+    "with_cancellers",
+]
 
 
 @dataclass(frozen=True)
@@ -122,6 +133,22 @@ def sine_target(axis: str, amplitude: float, frequency: float) -> tuple[Target, 
     level = smooth_step(periods / ramp)[0] * smooth_step((whole + 2 * ramp - periods) / ramp)[0]
     first = int(np.searchsorted(periods, ramp + whole - cycles))
     return target, level, slice(first, first + int(np.ceil(cycles / frequency * SAMPLE_RATE)))
+
+
+def default_amplitude(plant: Plant, axis: str, frequency: float) -> float:
+    """Amplitude [m, rad] of a sine on an axis that is a share (`sine.share` of the tuning file) of what fits.
+
+    Rounded down to two digits; raises as `sine_target` does.
+    """
+    share = tuning_numbers().number("sine.share")
+    stated = plant.machine.limits.displacement[AXES.index(axis)]
+    fits = stated * fitting_scale(plant, sine_target(axis, stated, frequency)[0])
+    return rounded_down(share * fits, 2)
+
+
+def rounded_down(value: float, digits: int) -> float:
+    """A positive value with a number of significant digits, never above it."""
+    return float(Context(prec=digits, rounding=ROUND_DOWN).create_decimal(value))
 
 
 def sine_test(

@@ -15,6 +15,7 @@ from scipy.linalg import block_diag, expm
 from ..control import Controller
 from ..core.arrays import Array
 from ..core.names import AXES, SAMPLE_RATE
+from ..mechanics.specimen_modes import specimen_growth
 from .identify import section, tuning_numbers
 from .margins import LinearTable, Margin, linear_table, make_loop_model, margins
 
@@ -30,6 +31,7 @@ class LoopCheck:
     growth_axis: str  # platen axis that moves most in it
     axes: tuple[str, ...]
     margins: tuple[Margin, ...]  # of each axis; they mean something where the loop is stable only
+    specimen_growth: float  # the same of the specimen's joints on a platen held fast; minus infinity without [1/s]
     limits: SimpleNamespace  # growth [1/s], gain_margin [1], phase_margin [rad] of `tuning.toml`
 
     @property
@@ -48,13 +50,23 @@ class LoopCheck:
         )
 
     @property
+    def falls(self) -> bool:
+        """Whether the specimen is unstable by itself, so that no controller holds it."""
+        return self.specimen_growth > self.limits.growth
+
+    @property
     def verdict(self) -> str:
         """`stable`, `thin` or `unstable`."""
-        return "unstable" if not self.stable else "thin" if self.thin else "stable"
+        return "unstable" if self.falls or not self.stable else "thin" if self.thin else "stable"
 
     @property
     def summary(self) -> str:
         """The verdict in a sentence."""
+        if self.falls:
+            return (
+                "The specimen is unstable in this pose, whatever the controller: on a platen held fast a motion of its "
+                f"joints grows by {self.specimen_growth:.3g} 1/s; lock it (--locked) or give its joints springs"
+            )
         if not self.stable:
             return (
                 f"The control loop is unstable by the linear model: a motion at {self.growth_frequency:.3g} Hz, mostly "
@@ -89,6 +101,7 @@ def check_loop(controller: Controller, table: LinearTable | None = None) -> Loop
         growth_axis=axes[int(np.argmax(moved * lever))],
         axes=axes,
         margins=margins(model, controller),
+        specimen_growth=specimen_growth(controller.plant),
         limits=limits,
     )
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ...core.names import AXES
 from ...core.units import quantity_unit
-from ..channels import channel_unit
+from ..channels import LAYOUT, channel_unit
 from .channel_map import ChannelMap, Source, TestFacts, channels_of, source_line, with_labels
 from .channel_units import without_unit
 from .guess_words import (
@@ -50,8 +50,17 @@ class _Machine(NamedTuple):
 
 
 def is_export(raws: Sequence[RawTest]) -> bool:
-    """Whether the files were written by `export_record` or are records, whose columns are named by channel."""
-    return all("layout_version" in raw.facts for raw in raws)
+    """Whether the files were written by `export_record` or are records, whose columns are named by channel.
+
+    A record need not state its layout: one is recognised by its columns, all channels of the layout with unit and time.
+    """
+    return all("layout_version" in raw.facts or _of_layout(raw) for raw in raws)
+
+
+def _of_layout(raw: RawTest) -> bool:
+    """Whether all columns of a file are channels of a record, such as platen_acceleration_x, with unit and time."""
+    known = (name in LAYOUT or name.rpartition("_")[0] in LAYOUT for name in raw.names)
+    return raw.time is not None and None not in raw.units and bool(raw.names) and all(known)
 
 
 def guess_map(

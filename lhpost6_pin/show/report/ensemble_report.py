@@ -20,7 +20,9 @@ TRACKED = "acceleration RRMSE, delay removed, worst axis"
 def write_ensemble_report(results: xr.Dataset, found: EnsembleSummary, path: Path, command: str = "") -> Path:
     """Write the self-contained HTML report of an ensemble's results to `path` and return the path."""
     failed = sum(found.failures.values())
-    level: Level = "attention" if failed or found.stopped or found.troubles else "good"
+    level: Level = "attention" if failed or found.stopped or found.troubles or found.loops else "good"
+    if any(loop.verdict == "unstable" for loop in found.loops):
+        level = "bad"
     scale = int(np.flatnonzero(found.scales == found.shown_scale)[0])
     sections = [
         Section("risk", "Risk of reaching a limit", _risk_blocks(results, found, scale)),
@@ -65,7 +67,7 @@ def _headlines(found: EnsembleSummary, scale: int, failed: int) -> list[Headline
     if at:
         worst_of = max(at, key=lambda s: float(s.quantiles[1]))
         low, middle, high = (percent(float(q)) for q in worst_of.quantiles)
-        note = f"{low} to {high} (5 to 95 %), {worst_of.motion}"
+        note = f"{low} to {high} (5 to 95 %), {worst_of.motion} at scale {worst_of.scale:g}"
         headlines.append(Headline(middle, "median RRMSE of acceleration, delay removed, worst axis", note))
     return headlines
 

@@ -60,8 +60,10 @@ def interaction_blocks(record: xr.Dataset, found: Interaction) -> list[Block]:
     if modes:
         shown.append(Table("Modes of the specimen on a fixed base", header, modes))
         shown += period_table(record, found)
-    else:
+    elif found.rigid:
         shown.append("The specimen is rigid: it has no periods of its own.")
+    else:
+        shown.append("The specimen has no mode on a fixed base that its model states.")
     return shown
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...data.metrics import kinds, sampling
+from ...data.metrics import commanded_axes, kinds, sampling
 from ...data.replay_comparison import Compared, Paired, paired
 from .page import Block, Figure, Headline, Level, Page, Section, Table, details, grid, missing, number, save_page
 from .plots import ACHIEVED, TARGET, Row, Trace, time_figure
@@ -46,7 +46,8 @@ def write_open_loop_report(
     """
     start, step = sampling(measured)
     pairs = {pair.name: pair for pair in paired(measured, simulated, (*MOTION, *ACTUATORS))}
-    verdict, level = _verdict(simulated, compared)
+    judged = _of_moving_axes(measured, compared)
+    verdict, level = _verdict(simulated, judged)
     attrs = simulated.attrs
     load = "bare table" if attrs["specimen"] == "none" else f"specimen {attrs['specimen']}"
     page = Page(
@@ -59,8 +60,8 @@ def write_open_loop_report(
         verdict=verdict,
         level=level,
         headlines=[
-            _worst(compared, "platen_displacement", "Worst displacement RRMSE"),
-            _worst(compared, "actuator_force", "Worst actuator force RRMSE"),
+            _worst(judged, "platen_displacement", "Worst displacement RRMSE"),
+            _worst(judged, "actuator_force", "Worst actuator force RRMSE"),
             _drift(compared),
         ],
         sections=[
@@ -104,6 +105,12 @@ def _verdict(simulated: xr.Dataset, compared: Sequence[Compared]) -> tuple[str, 
     if not words:
         return "The model was driven by the recorded spools; neither displacements nor forces are compared.", "plain"
     return f"Driven by the recorded spools, the model differs by an RRMSE of {' and '.join(words)} at most.", "plain"
+
+
+def _of_moving_axes(measured: xr.Dataset, compared: Sequence[Compared]) -> list[Compared]:
+    """Channels by which a replay is judged: those of axes at rest in the target are noise for the most."""
+    commanded = commanded_axes(measured)
+    return [c for c in compared if not c.channel.startswith("platen_displacement") or _label(c) in commanded]
 
 
 def _largest(compared: Sequence[Compared], name: str) -> Compared | None:

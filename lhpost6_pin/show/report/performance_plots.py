@@ -42,6 +42,7 @@ class Load(NamedTuple):
     name: str  # "bare table", or the specimen's
     axes: Sequence[AxisPerformance]
     bandwidth: float = math.inf  # stated, up to which the table is used [Hz]
+    valves: str = ""  # open servovalves, in words
 
 
 class Peaks(NamedTuple):
@@ -109,7 +110,8 @@ def performance_table(loads: Sequence[Load], axes: Sequence[str] | None = None) 
                 row = (load.name, f"{one.axis} {quantity}", first, scale.unit, bounds[0].by, "; ".join(said[1:]) or "–")
                 rows.append(row)
     header = ("Load", "Limit", "Value", "Unit", "Governed by", "Next")
-    return Table("Limits of sinusoidal motion by axis, the governing one first", header, rows)
+    valves = f", {loads[0].valves}" if loads and loads[0].valves else ""
+    return Table(f"Limits of sinusoidal motion by axis, the governing one first{valves}", header, rows)
 
 
 def _paper(axis: str, loads: Sequence[Load], motion: Peaks | None) -> Figure:

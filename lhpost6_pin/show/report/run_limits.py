@@ -23,7 +23,8 @@ def limit_blocks(uses: Sequence[LimitUse]) -> list[Block]:
         return ["Neither limits of the machine nor spools are available."]
     words = (
         "For each quantity the axis or actuator with the largest demand over capacity. The capacity of actuator "
-        "velocity is that of the unloaded piston at full spool. Unloading is the loss of a bearing actuator's force, "
+        "velocity is that of the unloaded piston at full spool less the reserve of the check before the run "
+        "(limits.valve_reserve of the machine file). Unloading is the loss of a bearing actuator's force, "
         "from rest to its least chamber pressure; forces and moments along an axis are beyond rest, over the capacity "
         "along that axis alone. All axes and actuators are in the other sections."
     )

@@ -47,7 +47,7 @@ class LiveScene:
         *,
         bare: bool = False,
     ) -> None:
-        """Draw the machine in the `window` of its page, `bare` without words; raises ParameterError as `Look.refuse`."""
+        """Draw the machine in a `window`, `bare` without words; raises ParameterError as `Look.refuse`."""
         look.refuse()
         self._limits = plant_limits(make_plant(machine))
         self._machine, self._look = machine, look

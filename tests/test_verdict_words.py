@@ -63,7 +63,8 @@ def test_a_headline_states_how_much_of_the_error_an_effect_leaves():
     assert verdict_sentence(found).startswith("Effect identified, 71 % of the held-out error remains: ")
     assert "71 % of the error beyond the floor remains (inverse dynamics, 1Hz_1in: " in summary(found)
     assert _verdict_of(found)[1] == "attention"
-    assert _headlines(found)[0].value == "effect identified, 71 % of the held-out error remains"
+    card = _headlines(found)[0]
+    assert (card.value, card.note) == ("effect identified", "71 % of the held-out error remains")
 
 
 def test_an_effect_that_closes_the_error_is_simply_identified():
@@ -147,7 +148,7 @@ def test_balances_and_phases_have_their_own_units():
     assert "sensor noise alone" in _proof_table(found.proof).caption
     names = [note["text"] for note in gap_figure(found).layout["annotations"]]
     assert {"inverse dynamics, 1Hz_1in: over sensor noise", "wrench, 1Hz_1in: over expected scatter"} <= {*names}
-    assert _headlines(found)[-1].note.endswith("1 is the sensor noise")
+    assert _headlines(found)[-1].note.endswith("in units of sensor noise")
 
 
 def test_beside_intervals_stands_that_misfit_is_left():

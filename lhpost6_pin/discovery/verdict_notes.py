@@ -107,10 +107,12 @@ def interval_note(found: "Discovery") -> str:
     left = [kind for kind in search.problem.kinds if search.misfit(kind) > limit]
     if not left and open_share(found) <= OPEN:
         return ""
-    where = f"of {', '.join(left)}" if left else "of held-out tests"
+    where = (
+        f"of {', '.join(left)} is left beyond that scatter" if left else "of held-out tests is left beyond its floor"
+    )
     return (
-        f"Intervals allow for the expected scatter, not for errors of the model: misfit {where} is left beyond it, so "
-        "that they are too narrow."
+        f"Intervals allow for the expected scatter, not for errors of the model: misfit {where}, so that they are too "
+        "narrow."
     )
 
 

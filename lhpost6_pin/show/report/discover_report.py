@@ -202,7 +202,8 @@ def _acted_on(found: Discovery) -> set[str]:
 def _headlines(found: Discovery) -> list[Headline]:
     verdict = found.verdict
     named = ", ".join(title_of(one.family) for one in verdict.effects) or "none"
-    shown = [Headline(_verdict_of(found)[0], "Verdict")]
+    words, _, left = _verdict_of(found)[0].partition(", ")
+    shown = [Headline(words, "Verdict", left)]
     if verdict.word == "sensor":
         first = verdict.sensors[0]
         size = f"{first.estimate.value:.4g} {first.estimate.unit}"
@@ -215,7 +216,7 @@ def _headlines(found: Discovery) -> list[Headline]:
             Headline(
                 f"{number(refitted)} → {number(after)}",
                 f"Largest normalised RMS error: {widest}",
-                f"refitted → with the effects; 1 is the {unit}",
+                f"refitted → with the effects; in units of {unit}",
             )
         )
     return shown

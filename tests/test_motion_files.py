@@ -11,6 +11,7 @@ from lhpost6_pin.data.motion_files import load_any_motion, motion_of
 from lhpost6_pin.data.records import load_record, make_record, save_record
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.studies.plan_file import plan_from
+from lhpost6_pin.tuning.drives import save_drive
 
 GRAVITY = 9.80665
 TIME = np.arange(400) * 0.005
@@ -168,3 +169,9 @@ def test_a_run_is_run_again_from_its_record_and_never_over_it(lhpost6, tmp_path)
     peaks = [np.abs(one["reference_displacement"].values).max() for one in (first, again)]
     assert peaks[1] == pytest.approx(peaks[0], rel=1e-3)
     assert again.attrs["time_scale"] == 1.0 and again.attrs["motion"] == "record"
+
+
+def test_a_drive_is_no_motion_and_says_what_runs_it(tmp_path, target):
+    path = save_drive(target.acceleration, "acceleration", target, tmp_path / "drive.nc", {})
+    with pytest.raises(MotionError, match=r"this is a drive, which `lhpost6 replay .*drive\.nc` runs"):
+        load_any_motion(path)

@@ -1,6 +1,7 @@
 """`lhpost6 new-machine`: a machine file from the few numbers that a laboratory knows, and what it makes of them."""
 
 import math
+import re
 import tomllib
 from dataclasses import fields
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import refused
+from machine_cases import machine_named
 
 from lhpost6_pin.cli.new_machine import Answers, ask
 from lhpost6_pin.core.errors import ParameterError
@@ -21,6 +23,7 @@ from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.machine.parameters import load_parameters
 from lhpost6_pin.mechanics.equilibrium import actuator_speeds, unloaded_speeds
 from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.show.new_machine import print_draft
 
 KNOWN = {"mass": "310 kg +- 20 %", "area": "24 cm2", "stroke": "+-125 mm", "supply_pressure": "14 MPa"}
 SMALL = {**KNOWN, "return_pressure": "0 MPa", "speed": "0.37 m/s/V"}
@@ -281,3 +284,8 @@ def test_templates_are_no_machines():
     assert Path(models_folder() / "templates" / "new_machine.toml").is_file()
     with pytest.raises(Exception, match="no machine named 'new_machine'"):
         load_machine("new_machine")
+
+
+def test_limits_of_a_draft_are_printed_with_their_units(capsys, tmp_path):
+    print_draft(machine_named("uniaxial"), tmp_path / "m.toml")
+    assert "x 0.15 m 0.4 m/s 20 m/s2" in " ".join(re.sub("[^!-~]", " ", capsys.readouterr().out).split())

@@ -181,7 +181,7 @@ def test_file_that_is_not_there_or_not_text_is_refused(tmp_path):
     (tmp_path / "folder.toml").mkdir()
     (tmp_path / "image.toml").write_bytes(b"\xff\xd8\xff\xe0")
     (tmp_path / "empty.toml").write_text("", encoding="utf-8")
-    words = {"none": "no such machine file", "folder": "cannot be read", "image": "not a TOML file", "empty": "empty"}
+    words = {"none": "no such file", "folder": "cannot be read", "image": "not a TOML file", "empty": "empty"}
     for name, message in words.items():
         with pytest.raises(ParameterError, match=message):
             load_machine(tmp_path / f"{name}.toml")

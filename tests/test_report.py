@@ -652,3 +652,11 @@ def test_modes_of_a_specimen_are_listed_and_only_a_rigid_one_is_called_rigid(rig
     assert ("Modes of the specimen on a fixed base" in captions) is not rigid
     assert any("at the specimen's periods" in caption for caption in captions) is not rigid
     assert any("rigid" in block for block in blocks if isinstance(block, str)) is rigid
+
+
+def test_a_report_of_a_record_alone_says_that_limits_were_not_evaluated(tmp_path):
+    summary = write_run_report(make_record(), tmp_path / "report.html")
+    assert {use.quantity for use in summary.limits} == {"spool"}
+    assert summary.headlines[2].label == "Largest spool demand; limits were not evaluated"
+    page = (tmp_path / "report.html").read_text()
+    assert "Limits of the machine were not evaluated" in page and "Unloading is the loss" not in page

@@ -24,7 +24,7 @@ from lhpost6_pin.show.run_results import notes_of_run, run_remarks, write_test_r
 from lhpost6_pin.show.tables import print_run
 from lhpost6_pin.simulation.divergence import amplified_mode
 from lhpost6_pin.simulation.rehearse import rehearse, replay
-from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, fastest_engine, simulate, simulate_many
+from lhpost6_pin.simulation.simulate import ClosedLoop, OpenLoop, diagnosis, fastest_engine, simulate, simulate_many
 from lhpost6_pin.tuning.margins import without_dry_friction
 
 pytestmark = pytest.mark.long
@@ -302,3 +302,11 @@ def test_only_free_joints_of_a_specimen_need_the_per_step_engine(plant):
 
 
 # Effects and specimens -----------------------------------------------------------------------------------------------
+
+
+def test_only_a_replay_is_told_to_start_from_its_record(plant):
+    """A campaign or a rehearsal has no record whose pose it could start from."""
+    closed, replayed = (
+        diagnosis(plant, 1, 1.0, "semi_implicit", 8192, replayed=replayed) for replayed in (False, True)
+    )
+    assert "record" not in closed and "the record's own pose" in replayed

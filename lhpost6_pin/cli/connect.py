@@ -54,7 +54,7 @@ def serve(
     mode: Annotated[str, typer.Option(help="lock-step, real-time, or free (as fast as possible).")] = "lock-step",
     host: Annotated[str, typer.Option(help="Address to listen on; default: this computer only.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="UDP port; 0: any free one.")] = 46946,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="Duration [s]; default: until Ctrl-C.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help=r"Duration \[s]; default: until Ctrl-C.")] = None,
     parked: Annotated[bool, typer.Option("--parked", help="Start with the platen parked, not raised.")] = False,
     fault: Annotated[
         list[str] | None,
@@ -96,7 +96,7 @@ def serve_specimen(
     specimen: Annotated[str, typer.Argument(help="FILE.py:NAME, a class or an OpenSees model.")],
     host: Annotated[str, typer.Option(help="Address to listen on; default: this computer only.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="UDP port; 0: any free one.")] = 46947,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="Duration [s]; default: until Ctrl-C.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help=r"Duration \[s]; default: until Ctrl-C.")] = None,
     json: Json = False,
 ) -> None:
     """Serve a specimen over UDP to a table in another process or on another computer (`--specimen udp:HOST:PORT`)."""

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..core.errors import ParameterError
+
 if TYPE_CHECKING:
     from ..machine.machine import Machine
     from ..simulation.snapshot import Watch
@@ -56,6 +58,8 @@ def watched(
     while it is paused there, unless `ended`.
     """
     if not options.live:
+        if options.amplify != 1.0 or options.force_change:
+            raise ParameterError("--amplify and --force-change are options of the view of a run; add --live")
         yield None
         return
     from ..show.viewer import LiveView, Look, view_apart

@@ -56,8 +56,8 @@ class MotionOptions:
     match_spectrum: MatchSpectrum = None
     spectrum_damping: SpectrumDamping = None
     set_: Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")] = None
-    dt: Annotated[float | None, typer.Option(help="Time step of a motion file that does not say it [s].")] = None
-    unit: Annotated[str | None, typer.Option(help="Unit of a motion file that does not say it, such as g.")] = None
+    dt: Annotated[float | None, typer.Option(help=r"Time step of a motion file that does not state it \[s].")] = None
+    unit: Annotated[str | None, typer.Option(help="Unit of a motion file that does not state it, such as g.")] = None
     channels: Annotated[
         str | None, typer.Option(help="Channels or columns of a motion file by axis, such as x=2,y=1,z=3.")
     ] = None

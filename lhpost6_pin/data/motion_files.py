@@ -74,6 +74,8 @@ def read_any_components(
     if not (b"\0" in begin or path.suffix.lower() == ".mat" or _EXPORT.match(begin)):
         return read_components(path, stated, channels)
     raws, where = load_raw(path), str(path)
+    if any(raw.facts.get("kind") == "drive" for raw in raws):
+        raise MotionError(f"{path}: this is a drive, which `lhpost6 replay {path}` runs")
     own = is_export(raws)
     columns = list(_columns(raws))
     if own:

@@ -193,7 +193,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
     try:
         return read_toml(path)
     except FileNotFoundError:
-        raise ParameterError(f"{path}: no such machine file") from None
+        raise ParameterError(f"{path}: no such file") from None
     except ValueError as error:  # of TOML and of UTF-8
         raise ParameterError(f"{path}: not a TOML file: {error}") from None
     except OSError as error:

@@ -49,14 +49,17 @@ def print_draft(machine: Machine, path: Path) -> None:
     counted = Counter(q.evidence for q in machine.parameters.values())
     known = ", ".join(f"{count} {evidence}" for evidence, count in counted.items())
     limits = machine.limits
-    rows = [
-        (AXES[k], *(f"{x[k]:.3g}" for x in (limits.displacement, limits.velocity, limits.acceleration)))
-        for k in machine.axes
-    ]
+    rows = []
+    for k in machine.axes:
+        unit = "m" if k < 3 else "rad"
+        units = zip(
+            (limits.displacement, limits.velocity, limits.acceleration), (unit, f"{unit}/s", f"{unit}/s2"), strict=True
+        )
+        rows.append((AXES[k], *(f"{values[k]:.3g} {per}" for values, per in units)))
     print_blocks(
         f"{machine.name}: {machine.title}",
         f"numbers: {known}; the assumed ones are marked in `lhpost6 info --machine {path}`",
-        Table("Limits that follow", ("axis", "displacement [m, rad]", "velocity", "acceleration"), rows),
+        Table("Limits that follow", ("axis", "displacement", "velocity", "acceleration"), rows),
     )
     print_modes(machine)
     print_blocks(f"tune its controller: lhpost6 tune --machine {path}")

@@ -25,7 +25,7 @@ def amplified_mode(plant: Plant, scheme: str, rate: int) -> tuple[float, float]:
     rest = find_equilibrium(plant)
     own = np.linalg.eigvals(linearize(plant, rest.state, rest.spool).A).astype(complex)
     own = own[(own.real < 0.0) & (own.imag >= 0.0)]
-    growth = rate * np.log(np.abs(_factor(own / rate, scheme)))
+    growth = rate * np.log(np.abs(_factor(np.asarray(own / rate, np.complex128), scheme)))
     worst = int(np.argmax(growth))
     return (float(own[worst].imag / (2.0 * np.pi)), float(growth[worst])) if growth[worst] > 0.0 else (0.0, 0.0)
 
@@ -41,6 +41,6 @@ def scheme_divergence(plant: Plant, scheme: str, rate: int, time: float) -> str:
     )
 
 
-def _factor(z: Complex, scheme: str) -> Complex:
+def _factor(z: Any, scheme: str) -> Complex:
     """Factor of one step on a mode whose rate times the step is z."""
     return np.asarray(1.0 + z if scheme == "euler" else 1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0))))

@@ -125,7 +125,9 @@ def simulate(
     if status and status != _STOPPED and trouble is None:
         diverged = scheme_divergence(plant, scheme, steps_per_second, done / SAMPLE_RATE)
     if status and trouble is None:
-        trouble = diverged or diagnosis(plant, status, done / SAMPLE_RATE, scheme, steps_per_second)
+        trouble = diverged or diagnosis(
+            plant, status, done / SAMPLE_RATE, scheme, steps_per_second, replayed=not closed
+        )
     if trouble:
         log.warning(trouble)
     if clipped:
@@ -290,14 +292,16 @@ def _run_fused(job: _Job) -> tuple[int, int, int]:
     return 0, samples, clipped
 
 
-def diagnosis(plant: Plant, status: int, time: float, scheme: str, rate: int) -> str:
-    """Meaning of a stage's status other than 0, and the remedy."""
+_REPLAYED = "scale the motion down, or start from the record's own pose and pressures"
+
+
+def diagnosis(plant: Plant, status: int, time: float, scheme: str, rate: int, *, replayed: bool = False) -> str:
+    """Meaning of a stage's status other than 0, and the remedy; `replayed`: of a run by recorded spools."""
     if status > 0:
         actuator = plant.machine.actuators[status - 1]  # a strut has no stroke
         bumper = f" through its bumper to the hard stop at {actuator.hard_stop:g} m" if actuator.bumper_travel else ""
-        return (
-            f"stopped at {time:.4f} s: {actuator.name} left its stroke of +-{actuator.stroke:g} m{bumper}; "
-            "scale the motion down, look at the controller, or start from the record's own pose and pressures"
+        return f"stopped at {time:.4f} s: {actuator.name} left its stroke of +-{actuator.stroke:g} m{bumper}; " + (
+            _REPLAYED if replayed else "scale the motion down, or look at the controller"
         )
     if status == _STOPPED:
         return f"stopped at {time:.4f} s: interrupted by a signal; what was done until then is kept"

@@ -7,7 +7,7 @@ from ...simulation.limit_use import TOLERANCE, LimitUse, governing_limits
 from .page import Block, Table, bar, number
 from .scales import SCALES, axis_scale, shown_as
 
-__all__ = ["demand_table", "limit_blocks", "limit_table"]
+__all__ = ["NOT_EVALUATED", "demand_table", "limit_blocks", "limit_table", "only_spools"]
 
 SHOWN = {"actuator stroke": "displacement", "actuator velocity": "velocity"}
 SHOWN |= {"actuator unloading": "force", "reaction mass strength": "force", "platen strength": "force"}
@@ -17,10 +17,20 @@ SHOWN |= {"axis yaw moment": "moment"}
 SHOWN |= {"push": "force", "pull": "force", "force": "force", "spool": "ratio"}
 
 
+NOT_EVALUATED = "Limits of the machine were not evaluated: a record alone has spools only"
+
+
+def only_spools(uses: Sequence[LimitUse]) -> bool:
+    """Whether of all limits that of the spools alone is known, as of a record without its machine."""
+    return all(use.quantity == "spool" for use in uses)
+
+
 def limit_blocks(uses: Sequence[LimitUse]) -> list[Block]:
     """Return the table of demand over capacity, the governing limit first."""
     if not uses:
         return ["Neither limits of the machine nor spools are available."]
+    if only_spools(uses):
+        return [f"{NOT_EVALUATED}; `show_report` of the whole test, or `lhpost6 run`, has them.", limit_table(uses)]
     words = (
         "For each quantity the axis or actuator with the largest demand over capacity. The capacity of actuator "
         "velocity is that of the unloaded piston at full spool less the reserve of the check before the run "

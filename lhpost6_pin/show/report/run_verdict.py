@@ -8,6 +8,7 @@ import xarray as xr
 from ...data.metrics import SpoolUse, Tracking, channel, labels
 from ...simulation.limit_use import TOLERANCE, LimitUse, governing_limits
 from .page import Headline, Level, number
+from .run_limits import only_spools
 from .scales import SCALES, axis_scale, late_or_ahead, percent, shown_as
 
 __all__ = ["headlines", "verdict_of_run"]
@@ -129,6 +130,7 @@ def _governing_limit(uses: Sequence[LimitUse]) -> Headline:
     if not uses:
         return Headline("–", label, "neither limits of the machine nor spools are available")
     use = governing_limits(use for use in uses if use.decides)[0]
+    label = "Largest spool demand; limits were not evaluated" if only_spools(uses) else label
     over = use.share >= 1.0 if use.quantity == "spool" else use.share > 1.0 + TOLERANCE
     level: Level = "bad" if over else "attention" if use.share >= NEAR else "good"
     share = percent(use.share) if np.isfinite(use.share) else "no capacity"

@@ -4,6 +4,8 @@ One step of dt multiplies a mode with rate s by R(z), z = s dt: 1 + z with Euler
 Runge-Kutta 4; it grows at ln|R| / dt. The modes are those of the plant linearised at rest, valves at rest.
 """
 
+from typing import Any
+
 import numpy as np
 
 from ..core.arrays import Complex

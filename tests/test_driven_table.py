@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.control.plug import Feedback
-from lhpost6_pin.core.errors import ControllerError, MotionError, OutOfRangeError
+from lhpost6_pin.core.errors import ControllerError, LhpostError, MotionError, OutOfRangeError
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.interfaces.link import Datagram, Kind, LinkMode, PlantState, Reading, ServedPlant, decode, encode
 from lhpost6_pin.interfaces.link.protocol import MOTION
@@ -16,8 +16,9 @@ from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.panel.demand import check_program
 from lhpost6_pin.panel.drive import Drive
-from lhpost6_pin.panel.engine import BLOCK, Engine
+from lhpost6_pin.panel.engine import BLOCK, Engine, Status
 from lhpost6_pin.panel.moves import Moved, at_rest, move_to
+from lhpost6_pin.panel.orders import Orders
 from lhpost6_pin.panel.programs import Recorded, make_wave
 from lhpost6_pin.panel.recording import Recording, record_of_rows
 from lhpost6_pin.panel.ring import ROWS, Ring, RingReader
@@ -399,3 +400,46 @@ def test_samples_that_were_missed_repeat_the_row_before_and_a_new_session_is_ano
 @pytest.mark.fast
 def test_moves_at_rest_stay():
     assert np.array_equal(at_rest(np.array([1.0, 2.0]), 5.0).at(np.array([0.0, 5.0, 9.0])).value, [[1.0, 2.0]] * 3)
+
+
+# --------------------------------------------------------------------------------------------- orders
+STATUS = Status(
+    "high", "raised", "", None, "stopped", 0.0, None, (0.0,) * 6, (0.1,) * 6, 1.0, (1.0,) * 6, (True,) * 6, ("",) * 6
+)
+plain = (
+    st.none() | st.booleans() | st.integers(-9, 9) | st.floats() | st.text(max_size=6) | st.sampled_from(["x", "sine"])
+)
+keys = st.sampled_from(["to", "axis", "value", "wave", "frequency", "cycles", "axes", "name", "limit", "on", "where"])
+
+
+@pytest.fixture(scope="module")
+def orders(machine, tmp_path_factory):
+    return Orders(machine, NUMBERS, tmp_path_factory.mktemp("orders"))
+
+
+@given(
+    st.sampled_from(["pressure", "setpoint", "span", "scale", "generator", "interlock", "fault", "run", "jump"]),
+    st.dictionaries(keys, plain | st.lists(plain, max_size=3), max_size=5),
+    st.sampled_from([STATUS, None]),
+)
+@settings(max_examples=200, deadline=None)
+def test_whatever_a_browser_sends_is_an_order_or_refused(orders, do, message, status):
+    try:
+        order = orders.of(do, message, status)
+    except (LhpostError, KeyError, TypeError, ValueError):  # what `Session.take` answers with a refusal
+        return
+    assert order["do"] in (do, "load") and isinstance(order["what"], str)
+    if "values" in order:
+        assert len(order["values"]) == 6 and np.isfinite(order["values"]).all()
+
+
+def test_a_motion_by_name_is_written_for_the_controller(orders):
+    order = orders.of("motion", {"name": "ridgecrest", "scale": 0.3, "axes": "xy"}, STATUS)
+    rows = np.load(order["file"], mmap_mode="r")
+    assert rows.shape[::2] == (3, 6) and rows[0, :, :2].any() and not rows[0, :, 2:].any()
+    with pytest.raises(OutOfRangeError, match="exceeds"):
+        orders.of("motion", {"name": "ridgecrest", "scale": 3.0}, STATUS)
+    with pytest.raises(LhpostError, match="no ground motion named"):
+        orders.of("motion", {"name": "../secret.csv", "scale": 1.0}, STATUS)
+    with pytest.raises(ControllerError, match="pressure is off"):
+        orders.of("motion", {"name": "ridgecrest", "scale": 1.0}, None)

@@ -154,7 +154,7 @@ def test_a_table_is_started_driven_tripped_reset_and_recorded(panel):
     recordings, log = asyncio.run(drive())
     assert panel.close() == 0
     record = load_record(recordings[0])
-    assert Path(recordings[0]).parent.name == "by_hand"
+    assert Path(recordings[0]).name == "by_hand.nc"
     wanted, x = (record[f"{who}_displacement"].values[:, 0] for who in ("reference", "platen"))
     assert np.abs(wanted).max() == pytest.approx(0.1, rel=0.01)
     assert np.sqrt(np.mean((x - wanted) ** 2)) < 0.15 * np.sqrt(np.mean(wanted**2))
@@ -297,13 +297,13 @@ def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
         await press(tab, "reset")
         await wait(tab, "!document.body.classList.contains('tripped')")
         await press(tab, "record")
-        await wait(tab, reads("recordings", "record.nc"))
+        await wait(tab, reads("recordings", "test-1.nc"))
         frame = "document.getElementById('view').contentDocument.getElementById('status')"
         await wait(tab, f"{frame}.textContent.includes('force')", "the 3-D view")
         return tab.faults
 
     assert browse(tmp_path, panel.url, look, (1440, 900)) == []
-    (recording,) = panel.folder.glob("*/record.nc")
+    (recording,) = panel.folder.glob("*.nc")
     assert np.abs(load_record(recording)["platen_displacement"].values[:, 0]).max() > 0.02
 
 

@@ -27,6 +27,9 @@ def panel(
     machine: SpecimenOptions,
     out: Annotated[Path | None, typer.Option(help="Directory of recordings and journal; default: out/panel.")] = None,
     controller: SettingsName = None,
+    sensors: Annotated[
+        str | None, typer.Option(help="Sensors whose noise recordings have, such as lhpost6; default: none.")
+    ] = None,
     valves: Valves = 0,
     server: Annotated[
         str | None, typer.Option(help="HOST:PORT of `lhpost6 serve --mode real-time`; default: a plant of its own.")
@@ -50,14 +53,15 @@ def panel(
 
     With another --host the page is open to others, who need the token in the address that is printed.
     """
+    from ..data.sensors import load_sensors
     from ..interfaces.link import make_faults
-    from ..panel.session import Session
+    from ..panel.session import Options, Session
     from ..panel.web import PanelServer
     from ..panel.worker import Setup, panel_numbers
 
     table = machine.load(valves)
     settings = find_settings(controller, table)
-    there = _address(server)
+    there, known = _address(server), load_sensors(sensors) if sensors else None
     if not 0.0 < pace <= 1.0:
         raise ParameterError(f"--pace {pace:g}: give a number above 0 and up to 1, which is real time")
     offered = fault or (str(panel_numbers().words["trainer.faults"]).split(", ") if trainer else [])
@@ -67,7 +71,7 @@ def panel(
     with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(2) as work:
         facts = {"controller": settings.name}
         setup = Setup(table, settings, Path(scratch) / "ring")
-        session = Session(setup, folder, there, work, facts, offered, pace)
+        session = Session(setup, folder, work, facts, Options(there, offered, pace, known))
         try:
             try:
                 page = PanelServer(session, host, port, trainer=trainer or bool(fault))

@@ -6,7 +6,6 @@ import re
 import secrets
 import socket
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from ..simulation.limit_use import plant_limits
 from ..simulation.snapshot import Snapshot
 from .interlocks import INTERLOCKS
 from .programs import WAVES
-from .session import Seat, Session
+from .session import Client, Session
 
 __all__ = ["PanelServer"]
 
@@ -45,7 +44,7 @@ class PanelServer:
         from tornado.netutil import bind_sockets
 
         self._session, self._trainer = session, trainer
-        self._local = host in ("127.0.0.1", "localhost", "::1")
+        self._local = host in ("127.0.0.1", "localhost")
         self._token = "" if self._local else secrets.token_urlsafe(16)
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self._sockets = bind_sockets(port, host, family=family)
@@ -56,9 +55,7 @@ class PanelServer:
         machine = session.machine
         self._scene = LiveScene(machine, machine.name, self._window, bare=True)
         self._capacity = plant_limits(make_plant(machine))
-        self._work = ThreadPoolExecutor(1)
         self._number = 0
-        self._rows: Array = np.zeros((0, session.layout.width))
         self._last = np.zeros(session.layout.width)
 
     def _window(self, page: str) -> SharedWindow:
@@ -106,8 +103,8 @@ class PanelServer:
         return self._token
 
     # ------------------------------------------------------------------------------------- browsers
-    def open(self, browser: Any) -> Seat:
-        """Seat a browser."""
+    def open(self, browser: Any) -> Client:
+        """Take a browser in."""
         self._number += 1
         number = f"b{self._number}"
         loop = self._loop
@@ -115,26 +112,26 @@ class PanelServer:
         def refuse(why: str) -> None:
             loop.call_soon_threadsafe(_write, browser, {"kind": "refusal", "what": why})
 
-        seat = Seat(number, refuse)
+        client = Client(number, refuse)
         self._browsers[number], self._sent[number] = browser, 0
-        self._session.sit(seat)
+        self._session.join(client)
         _write(browser, self._hello())
-        return seat
+        return client
 
-    def left(self, seat: Seat) -> None:
+    def left(self, client: Client) -> None:
         """Let a browser go."""
-        self._browsers.pop(seat.number, None)
-        self._sent.pop(seat.number, None)
-        self._session.leave(seat)
+        self._browsers.pop(client.number, None)
+        self._sent.pop(client.number, None)
+        self._session.leave(client)
 
-    def message(self, seat: Seat, text: str | bytes) -> None:
+    def message(self, client: Client, text: str | bytes) -> None:
         """Take what a browser sends."""
         try:
             message = json.loads(text)
         except ValueError:
             message = None
         if isinstance(message, dict):
-            self._session.take(seat, message)
+            self._session.take(client, message)
 
     def _hello(self) -> dict[str, Any]:
         machine = self._session.machine
@@ -165,8 +162,8 @@ class PanelServer:
                 self._draw()
         state = self._state(rows[::_EVERY])
         for number, browser in list(self._browsers.items()):
-            seat, entries = session.seats[number], session.journal.entries
-            own: dict[str, Any] = {"you": {"id": number, "role": session.role(seat), "name": seat.name}}
+            client, entries = session.clients[number], session.journal.entries
+            own: dict[str, Any] = {"you": {"id": number, "role": session.role(client), "name": client.name}}
             own["log"] = entries[self._sent[number] :]
             self._sent[number] = len(entries)
             _write(browser, state | own)
@@ -188,7 +185,7 @@ class PanelServer:
             "server": session.server,
             "time": self._last[0] / SAMPLE_RATE,
             "operator": operator.name if operator else None,
-            "watchers": len(session.seats) - (operator is not None),
+            "watchers": len(session.clients) - (operator is not None),
             "link": {
                 "ok": session.link == "on",
                 "word": session.link,
@@ -295,22 +292,22 @@ def _handlers(server: PanelServer) -> list[Any]:
             self.finish(path.read_bytes())
 
     class Socket(WebSocketHandler):  # tornado lets only pages of the same origin connect
-        seat: Seat | None = None
+        client: Client | None = None
 
         def prepare(self) -> None:
             _admitted(self, server)
 
         def open(self, *_: str, **__: str) -> None:
             self.set_nodelay(True)
-            self.seat = server.open(self)
+            self.client = server.open(self)
 
         def on_message(self, message: str | bytes) -> None:
-            if self.seat is not None:
-                server.message(self.seat, message)
+            if self.client is not None:
+                server.message(self.client, message)
 
         def on_close(self) -> None:
-            if self.seat is not None:
-                server.left(self.seat)
+            if self.client is not None:
+                server.left(self.client)
 
     files = [path.name for path in Path(__file__).parent.iterdir() if path.suffix in _TYPES]
     return [(f"/({'|'.join(map(re.escape, files))}|)", File), ("/socket", Socket)]

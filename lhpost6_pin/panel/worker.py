@@ -56,7 +56,7 @@ class _Link:
         self._later: list[tuple[str, Any]] = []
         self.orders: list[Mapping[str, Any]] = []
 
-    def say(self, kind: str, content: Any) -> None:
+    def report(self, kind: str, content: Any) -> None:
         self._later.append((kind, content))
 
     def look(self, seconds: float = 0.0) -> None:
@@ -107,8 +107,8 @@ class _Controller:
         self._reading: Reading | None = None
         self._shown: Status | None = None
         self._offered: dict[str, bool] = {}
-        self._counted = self._answered = self._kept = 0
-        link.say("ready", None)
+        self._answered = self._kept = 0
+        link.report("ready", None)
 
     def turn(self) -> None:
         """Wait for orders, or run a session while there is one."""
@@ -135,7 +135,7 @@ class _Controller:
             elif commanded:
                 silent += _IDLE
                 if silent >= _SILENCE:
-                    self._link.say("lost", "the server does not answer any more")
+                    self._link.report("lost", "the server does not answer any more")
                     self._end()
                     return
             else:
@@ -159,10 +159,10 @@ class _Controller:
             status = self._engine.status
             if self._shown is None or status._replace(program_time=0.0) != self._shown:
                 self._shown = status._replace(program_time=0.0)
-                self._link.say("status", status)
+                self._link.report("status", status)
             if self._client.faults != self._offered:
                 self._offered = dict(self._client.faults)
-                self._link.say("faults", self._offered)
+                self._link.report("faults", self._offered)
         self._link.look()
         self._obey()
 
@@ -171,10 +171,10 @@ class _Controller:
             order = self._link.orders.pop(0)
             try:
                 self._do(order)
-            except LhpostError as error:
-                self._link.say("refusal", (order.get("by"), str(error)))
+            except (LhpostError, KeyError, TypeError, ValueError) as error:  # the rest: an order that no page sends
+                self._link.report("refusal", (order.get("by"), str(error)))
             else:
-                self._link.say("done", order)
+                self._link.report("done", order)
 
     def _do(self, order: Mapping[str, Any]) -> None:
         if order["do"] == "pressure" and order["to"] != "high":
@@ -220,7 +220,7 @@ class _Controller:
     def _end(self) -> None:
         """End the session; counts of the server go to the page."""
         if self._client is not None:
-            self._link.say("ended", (self._client.close(), self._answered, self._client.sensors_lost))
+            self._link.report("ended", (self._client.close(), self._answered, self._client.sensors_lost))
         self._client = self._engine = self._shown = None
 
 

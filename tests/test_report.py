@@ -155,6 +155,24 @@ def test_the_delay_of_the_table_is_found_and_removing_it_removes_the_error(tmp_p
     assert summary.level == "good"
 
 
+def test_a_delay_whose_removal_does_not_reduce_the_error_is_none(tmp_path):
+    """A motion that is cut off in full shaking: ahead where the fit looks most, late where it is largest."""
+    record = make_record()
+    time = record["time"].values
+    t, whole = time - time[0], time[-1] - time[0]
+    target = (t / whole) ** 2 * np.sin(2.0 * np.pi * 1.5 * t)
+    moved = np.where(t < 0.85 * whole, 6e-3, -12e-3)  # [s] ahead, then late
+    achieved = (t / whole) ** 2 * np.sin(2.0 * np.pi * 1.5 * (t + moved))
+    for who, values in (("reference", target), ("platen", achieved)):
+        columns = record[f"{who}_displacement"].values.copy()
+        columns[:, 0] = 0.1 * values
+        record[f"{who}_displacement"] = record[f"{who}_displacement"].copy(data=columns)
+    summary, page = report(tmp_path, record)
+    row = next(row for row in summary.tracking if (row.axis, row.quantity) == ("x", "displacement"))
+    assert np.isnan(row.delay) and row.rrmse_aligned == row.rrmse > 0.05
+    assert "nan" not in page[: page.index("<script")]
+
+
 @pytest.mark.parametrize("ahead", [False, True])
 def test_a_negative_delay_is_explained_and_only_that(tmp_path, ahead):
     record = make_record()

@@ -110,7 +110,8 @@ def commanded_axes(record: xr.Dataset) -> list[str]:
 def track(record: xr.Dataset, quantity: str, *, errors: bool = True) -> list[Tracking]:
     """Return the tracking of `quantity` on every axis; empty if the record has no such motion.
 
-    Without `errors` only peaks are evaluated, not RRMSE and delay, which take far longer.
+    A delay is not-a-number where its removal does not reduce the error. Without `errors` only peaks are evaluated, not
+    RRMSE and delay, which take far longer.
     """
     if f"platen_{quantity}" not in record:
         return []
@@ -128,6 +129,8 @@ def track(record: xr.Dataset, quantity: str, *, errors: bool = True) -> list[Tra
             late = float(delay(target[:, k], achieved[:, k], step, longest))
             shifted = align(achieved[:, k], late, step) if np.isfinite(late) else achieved[:, k]
             without = float(rrmse(target[:, k], shifted))
+            if without > whole:  # the motion differs by more than a delay, as one that is cut off in full shaking
+                late, shifted, without = np.nan, achieved[:, k], whole
         wanted, reached = float(peaks(target[:, k])), float(peaks(achieved[:, k]))
         found.append(Tracking(axis, k, quantity, wanted, reached, whole, late, without, shifted))
     return found

@@ -96,7 +96,9 @@ def milliseconds(seconds: float) -> str:
 
 
 def late_or_ahead(delay: float) -> str:
-    """Return a delay [s] in words: of a motion behind its target, or if it is negative, ahead of it."""
+    """Return a delay [s] in words: of a motion behind its target, or if it is negative, ahead of it; or none."""
+    if np.isnan(delay):
+        return "no single delay"
     return f"delay {milliseconds(delay)}" if not delay < 0.0 else f"{milliseconds(-delay)} ahead of the target"
 
 

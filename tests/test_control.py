@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from lhpost6_pin.control import Notch, load_controller, make_controller
-from lhpost6_pin.control.loop import _GENERATOR, CANCELLER, MEMORY_ROWS, Feedback, cancel, control_step
+from lhpost6_pin.control.loop import GENERATOR, CANCELLER, MEMORY_ROWS, Feedback, cancel, control_step
 from lhpost6_pin.core.errors import ControllerError
 from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE
 from lhpost6_pin.data.signals import align, delay, rrmse
@@ -46,7 +46,7 @@ def step(plant, loop, pose, force, drive, memory=None):
 def with_speed(loop, k, speed):
     """Memory of a controller whose reference moves on one axis at a speed [m/s, rad/s] (acceleration mode)."""
     memory = loop.init()
-    memory[_GENERATOR + 1, k] = speed
+    memory[GENERATOR + 1, k] = speed
     return memory
 
 

@@ -1,11 +1,7 @@
 """The panel by which the table is driven by hand: panel."""
 
-import asyncio
-import signal
-import tempfile
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -15,9 +11,6 @@ from .completion import effect_names
 from .live_view import NoOpen, show_address
 from .options import Json, SettingsName, SpecimenOptions, Valves, find_settings
 from .results_folder import folder_for
-
-if TYPE_CHECKING:
-    from ..panel.web import PanelServer
 
 __all__ = ["panel"]
 
@@ -53,6 +46,9 @@ def panel(
 
     With another --host the page is open to others, who need the token in the address that is printed.
     """
+    import tempfile
+    from concurrent.futures import ThreadPoolExecutor
+
     from ..data.sensors import load_sensors
     from ..interfaces.link import make_faults
     from ..panel.session import Options, Session
@@ -78,19 +74,11 @@ def panel(
             except OSError as error:
                 raise LinkError(f"cannot listen on {host}:{port}: {error}; choose another --host or --port") from error
             show_address(page.url, f"the panel of {table.name}; Ctrl-C ends", not no_open, err=json)
-            asyncio.run(_serve(page))
+            page.serve()
         finally:
             session.close()
     files = [Path(path) for path in session.recordings]
     print_result(json, lambda: {"samples": session.answered, "late": session.missed}, lambda: None, files)
-
-
-async def _serve(page: "PanelServer") -> None:
-    """Serve until Ctrl-C or SIGTERM."""
-    stop, loop = asyncio.Event(), asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stop.set)
-    await page.run(stop)
 
 
 def _address(text: str | None) -> tuple[str, int] | None:

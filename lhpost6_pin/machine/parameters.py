@@ -6,12 +6,11 @@ one flat mapping from a path such as ``platen.mass``, ``horizontal.area_a`` or `
 """
 
 import logging
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from ..core.errors import ParameterError, UnknownNameError
 from ..core.files import find_shipped, read_toml, reason_of
@@ -162,9 +161,9 @@ def _overridden(
 
 def _doubt_unit(key: str, value: Value, base: Quantity) -> None:
     """Warn where a number without unit is far from the one stated, as one in another unit is."""
-    new, old = (np.abs(np.atleast_1d(x)) for x in (value, base.value))
-    known = (new > 0.0) & (old > 0.0)
-    if base.unit != "1" and np.any(np.abs(np.log10(new[known] / old[known])) > _FAR):
+    new, old = (x if isinstance(x, Iterable) else (x,) for x in (value, base.value))
+    ratios = [abs(a / b) for a, b in zip(new, old, strict=False) if a and b]
+    if base.unit != "1" and any(abs(math.log10(ratio)) > _FAR for ratio in ratios):
         log.warning(
             "%s: %r has no unit and is taken in %s, where %r is stated; write {'value': ..., 'unit': ...}",
             *(key, value, base.unit, base.value),

@@ -4,6 +4,7 @@ import asyncio
 import json
 import re
 import secrets
+import signal
 import socket
 from collections.abc import Mapping
 from pathlib import Path
@@ -68,12 +69,17 @@ class PanelServer:
         at = f"[{self._host}]" if ":" in self._host else self._host
         return f"http://{at}:{self._port}/" + (f"?token={self._token}" if self._token else "")
 
-    async def run(self, stop: asyncio.Event) -> None:
-        """Serve until the event is set."""
+    def serve(self) -> None:
+        """Serve until Ctrl-C or SIGTERM."""
+        asyncio.run(self._run())
+
+    async def _run(self) -> None:
         from tornado.httpserver import HTTPServer
         from tornado.web import Application
 
-        loop = asyncio.get_running_loop()
+        stop, loop = asyncio.Event(), asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, stop.set)
         self._loop = loop
         application = Application(cookie_secret=secrets.token_hex(16))
         handlers = [*_handlers(self), *(_guarded(self, rule) for rule in self._shared.handlers("/view/"))]

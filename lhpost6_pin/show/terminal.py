@@ -45,7 +45,13 @@ def _rich(table: Table, width: int) -> RichTable:
     for n, (heading, (right, whole, longest)) in enumerate(zip(table.header, columns, strict=True)):
         size = longest if n and whole and fits else None
         justify: JustifyMethod = "right" if right else "left"
-        made.add_column(escape(heading), justify=justify, no_wrap=n == 0 and fits, min_width=size, overflow="fold")
+        made.add_column(
+            escape(heading),
+            justify=justify,
+            no_wrap=n == 0 and (fits or longest <= width // 3),
+            min_width=size,
+            overflow="fold",
+        )
     for row in cells:
         made.add_row(*row)
     return made

@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from lhpost6_pin.control import Notch, load_controller, make_controller
-from lhpost6_pin.control.loop import GENERATOR, CANCELLER, MEMORY_ROWS, Feedback, cancel, control_step
+from lhpost6_pin.control.loop import CANCELLER, GENERATOR, MEMORY_ROWS, Feedback, cancel, control_step
 from lhpost6_pin.core.errors import ControllerError
 from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE
 from lhpost6_pin.data.signals import align, delay, rrmse

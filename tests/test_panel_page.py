@@ -213,6 +213,7 @@ def listeners(pids: list[int]) -> dict[int, set[tuple[str, str]]]:
     return found
 
 
+@pytest.mark.slow  # a minute each
 @pytest.mark.parametrize("which", ["plant", "controller"])
 def test_a_process_that_dies_is_announced_and_started_anew(panel, which):
     async def drive():

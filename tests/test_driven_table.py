@@ -404,7 +404,7 @@ def test_moves_at_rest_stay():
 
 # --------------------------------------------------------------------------------------------- orders
 STATUS = Status(
-    "high", "raised", "", None, "stopped", 0.0, None, (0.0,) * 6, (0.1,) * 6, 1.0, (1.0,) * 6, (True,) * 6, ("",) * 6
+    "high", "raised", "", None, "stopped", None, (0.0,) * 6, (0.1,) * 6, 1.0, (1.0,) * 6, (True,) * 6, ("",) * 6
 )
 plain = (
     st.none() | st.booleans() | st.integers(-9, 9) | st.floats() | st.text(max_size=6) | st.sampled_from(["x", "sine"])

@@ -7,7 +7,7 @@ import typer
 
 from ..core.errors import LinkError, ParameterError
 from .app import command, print_result
-from .completion import effect_names
+from .completion import completing, effect_names
 from .live_view import NoOpen, show_address
 from .options import Json, SettingsName, SpecimenOptions, Valves, find_settings
 from .results_folder import folder_for
@@ -34,7 +34,9 @@ def panel(
     ] = False,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help="A fault to offer, as entrained_air@H1; repeat for more.", autocompletion=effect_names),
+        typer.Option(
+            help="A fault to offer, as entrained_air@H1; repeat for more.", autocompletion=completing(effect_names)
+        ),
     ] = None,
     pace: Annotated[
         float, typer.Option(help="Speed of the table's clock; below 1 for a computer that is too slow for real time.")
@@ -66,7 +68,7 @@ def panel(
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(2) as work:
         facts = {"controller": settings.name}
-        setup = Setup(table, settings, Path(scratch) / "ring")
+        setup = Setup(table, settings, Path(scratch) / "ring", pace)
         session = Session(setup, folder, work, facts, Options(there, offered, pace, known))
         try:
             try:

@@ -183,7 +183,7 @@ def make_target(
     _refuse_infinite(motion.name, scale, displacement, velocity, acceleration)
     start = first * motion.time_step - lead / rate
     reference = Reference(motion.name, motion.source, scale, pairs, high_pass, low_pass, start, motion.time_scale)
-    spectrum = motion.spectrum and motion.spectrum.on_axes(pairs, scale)
+    spectrum = motion.spectrum and motion.spectrum.on_axes(pairs).with_scale(scale)
     return Target(np.arange(count) / rate, displacement, velocity, acceleration, reference, spectrum)
 
 
@@ -191,7 +191,7 @@ def with_scale(target: Target, scale: float) -> Target:
     """Copy of a target at another `scale` of its motion (the processing is linear)."""
     factor = scale / target.reference.scale
     rows = {key: factor * getattr(target, key) for key in ("displacement", "velocity", "acceleration")}
-    spectrum = target.spectrum and target.spectrum.on_axes(((a, a) for a in target.spectrum.acceleration), factor)
+    spectrum = target.spectrum and target.spectrum.with_scale(factor)
     return replace(target, reference=replace(target.reference, scale=scale), spectrum=spectrum, **rows)
 
 

@@ -22,10 +22,14 @@ class TargetSpectrum:
         logs = np.log(self.frequency), np.log(self.acceleration[axis])
         return np.exp(np.interp(np.log(frequency), *logs))
 
-    def on_axes(self, pairs: Iterable[tuple[str, str]], scale: float = 1.0) -> "TargetSpectrum":
-        """Spectrum of the table's axes, each moved by a component of the motion times `scale`: (axis, component)."""
-        found = {axis: abs(scale) * self.acceleration[part] for axis, part in pairs if part in self.acceleration}
+    def on_axes(self, pairs: Iterable[tuple[str, str]]) -> "TargetSpectrum":
+        """Spectrum of the table's axes, each moved by a component of the motion: (axis, component)."""
+        found = {axis: self.acceleration[part] for axis, part in pairs if part in self.acceleration}
         return replace(self, acceleration=found)
+
+    def with_scale(self, factor: float) -> "TargetSpectrum":
+        """Spectrum of the motion times a factor."""
+        return replace(self, acceleration={axis: abs(factor) * a for axis, a in self.acceleration.items()})
 
     def with_time_scale(self, factor: float) -> "TargetSpectrum":
         """Spectrum of the motion whose durations are times `factor` and whose accelerations stay."""

@@ -1,6 +1,6 @@
 """The controller of a driven table, sample by sample: without sockets, clocks and processes.
 
-Orders come as plain entries (`Order`); a sample is answered with a command, or with None where the table is not to be
+Orders come as plain entries (`orders`); a sample is answered with a command, or with None where the table is not to be
 commanded: before high pressure, and after a trip, when the server goes to its safe hold by itself.
 """
 
@@ -15,6 +15,7 @@ from ..control.settings import ControllerSettings
 from ..core.arrays import Array
 from ..core.errors import ControllerError
 from ..core.names import SAMPLE_RATE
+from ..data.metrics import QUANTITIES
 from ..interfaces.link import PlantState, Reading
 from ..machine.parameters import Parameters
 from ..mechanics.equilibrium import Equilibrium
@@ -23,11 +24,9 @@ from .drive import Drive
 from .interlocks import INTERLOCKS, Interlocks, Measured, measured_motion
 from .moves import Moved
 from .programs import Program
-from .rows import Rows
+from .rows import PRESSURES, Rows
 
 __all__ = ["BLOCK", "Engine", "Status"]
-
-_PRESSURES = ("chamber_pressure_a", "chamber_pressure_b", "spool_position", "strut_pressure", "supply_pressure")
 
 BLOCK = 32
 """Samples whose reference is computed together: an order acts within 16 ms, a trip at once."""
@@ -41,7 +40,6 @@ class Status(NamedTuple):
     trip: str  # empty: none
     program: str | None
     state: str
-    program_time: float
     duration: float | None
     setpoint: tuple[float, ...]
     span: tuple[float, ...]
@@ -66,7 +64,7 @@ class Engine:
         self._controller: Controller = make_controller(plant, rest, settings)
         self._tables = self._controller.tables
         self._interlocks = Interlocks(self._controller, rest, numbers)
-        self._numbers, self._rows, self._parked = numbers, rows, plant.machine.platen.parked
+        self._rows, self._parked = rows, plant.machine.platen.parked
         limits = plant.machine.limits
         free = np.isin(np.arange(6), plant.axes)
         self._speed = np.where(free, limits.velocity, np.inf)
@@ -234,7 +232,6 @@ class Engine:
             self.trip,
             drive.program,
             drive.state,
-            drive.time,
             drive.duration,
             tuple(map(float, self._drive.setpoint)),
             tuple(map(float, self._drive.span)),
@@ -246,19 +243,15 @@ class Engine:
 
     def _fill(self, reading: Reading, now: Measured, wanted: Moved | None) -> None:
         row, places = self.row, self._rows.places
-        state = self._drive.state(self._last)
-        codes = ("stopped", "running", "holding", "stopping").index(state.state)
-        row[:4] = reading.sample, int(reading.state), 4 if self.trip else codes, state.time
-        for name in ("displacement", "velocity", "acceleration"):
-            row[places[f"platen_{name}"]] = getattr(now, name)
-        for name, value in zip(("displacement", "velocity", "acceleration"), wanted or now[:3], strict=True):
-            row[places[f"reference_{name}"]] = value
+        row[:3] = reading.sample, int(reading.state), self._drive.state(self._last).time
+        for name, measured, reference in zip(QUANTITIES, now[:3], wanted or now[:3], strict=True):
+            row[places[f"platen_{name}"]], row[places[f"reference_{name}"]] = measured, reference
         row[places["shares"]] = self._interlocks.shares
         row[places["actuator_displacement"]] = reading.sensors.displacement
         row[places["actuator_force"]] = now.force
         row[places["spool_command"]] = self._command
         if reading.pressures is not None:
-            for name, values in zip(_PRESSURES, reading.pressures, strict=True):
+            for name, values in zip(PRESSURES, reading.pressures, strict=True):
                 row[places[name]] = values
 
     def _reference(self, sample: int) -> Moved:

@@ -85,17 +85,17 @@ class Interlocks:
         limits, free = plant.machine.limits, np.isin(np.arange(6), plant.axes)
         stated = np.array([limits.displacement, limits.velocity, limits.acceleration])
         with np.errstate(divide="ignore"):
-            self._per = np.where(free & (stated > 0.0), 1.0 / stated, 0.0)  # (3, 6)
+            per = np.where(free & (stated > 0.0), 1.0 / stated, 0.0)  # (3, 6)
         self._capacity = stated
-        span, self._rest = force_range(plant), rest.force
-        self._rise = 1.0 / np.maximum(span.most - rest.force, 1.0)
-        self._fall = 1.0 / np.maximum(rest.force - span.least, 1.0)
+        span = force_range(plant)
+        rise = 1.0 / np.maximum(span.most - rest.force, 1.0)
+        fall = 1.0 / np.maximum(rest.force - span.least, 1.0)
         along = axis_capacity(plant)
         at_b = controller.jacobian @ controller.lever  # (n, 6): leg rates per twist at B
-        self._moment = wrench_at_bearings(plant, at_b)[:, 3:5].T  # (2, n) moments at N per force
-        self._turn = np.array([along.rise[3:5], along.fall[3:5]])
-        self._turn[self._turn == 0.0] = np.inf
-        self._tables = self._per, self._rest, self._rise, self._fall, self._moment, self._turn
+        moment = wrench_at_bearings(plant, at_b)[:, 3:5].T  # (2, n) moments at N per force
+        turn = np.array([along.rise[3:5], along.fall[3:5]])
+        turn[turn == 0.0] = np.inf
+        self._tables = per, rest.force, rise, fall, moment, turn
         self._names = plant.machine.actuator_names
         self._spool = controller.settings.spool_limit
         self._longest = numbers.number("interlock.saturation") * SAMPLE_RATE

@@ -28,11 +28,6 @@ class _Process:
         """Whether it runs."""
         return self._process.is_alive()
 
-    @property
-    def number(self) -> int:
-        """Number of the process."""
-        return self._process.pid or 0
-
     def close(self) -> None:
         """End it."""
         self._pipe.close()

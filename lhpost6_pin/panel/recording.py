@@ -9,6 +9,7 @@ import xarray as xr
 from ..core.arrays import Array
 from ..core.errors import RecordError
 from ..core.names import SAMPLE_RATE
+from ..data.metrics import QUANTITIES
 from ..data.records import make_record
 from ..machine.machine import Machine
 from ..machine.recorded_changes import change_facts
@@ -70,9 +71,7 @@ def record_of_rows(rows: Array, layout: Rows, machine: Machine, attrs: Mapping[s
     about = {"units": "1", "long_name": "1 if the controller answered this sample"}
     channels: dict[str, Any] = {name: layout.of(rows, name) for name in _SAME}
     channels["answered"] = (("time",), (sample[at] == every).astype(np.int8), about)
-    channels |= reference_channels(
-        PlatenMotion(*(layout.of(rows, f"reference_{q}") for q in ("displacement", "velocity", "acceleration")))
-    )
+    channels |= reference_channels(PlatenMotion(*(layout.of(rows, f"reference_{q}") for q in QUANTITIES)))
     labels = machine.labels
     if np.isfinite(layout.of(rows, "supply_pressure")).all():
         double = [name in machine.double_acting for name in machine.actuator_names]

@@ -3,11 +3,14 @@
 from functools import cached_property
 
 from ..core.arrays import Array
+from ..data.metrics import QUANTITIES
 from .interlocks import INTERLOCKS
 
-__all__ = ["Rows"]
+__all__ = ["PRESSURES", "Rows"]
 
-STATE = ("sample", "plant_state", "state", "program_time")
+STATE = ("sample", "plant_state", "program_time")
+PRESSURES = ("chamber_pressure_a", "chamber_pressure_b", "spool_position", "strut_pressure", "supply_pressure")
+"""In the order of a reading's."""
 
 
 class Rows:
@@ -20,11 +23,10 @@ class Rows:
         """Lay out the columns."""
         widths = dict.fromkeys(STATE, 1)
         for who in ("platen", "reference"):
-            widths |= {f"{who}_{quantity}": 6 for quantity in ("displacement", "velocity", "acceleration")}
+            widths |= {f"{who}_{quantity}": 6 for quantity in QUANTITIES}
         widths |= {"shares": len(INTERLOCKS)}
         widths |= dict.fromkeys(("actuator_displacement", "actuator_force", "spool_command"), actuators)
-        widths |= dict.fromkeys(("chamber_pressure_a", "chamber_pressure_b", "spool_position"), actuators)
-        widths |= {"strut_pressure": struts, "supply_pressure": 1}
+        widths |= dict(zip(PRESSURES, (actuators, actuators, actuators, struts, 1), strict=True))
         self.widths = widths
 
     @cached_property

@@ -18,8 +18,8 @@ from ..core.names import AXES, SAMPLE_RATE
 from ..mechanics.plant import make_plant
 from ..motions import list_motions
 from ..show.viewer import LiveScene, SharedWindow
-from ..show.viewer.window import HOSTS
-from ..simulation.limit_use import plant_limits
+from ..show.viewer.window import HOSTS, write_message
+from ..simulation.limit_use import plant_limits, sample_shares
 from ..simulation.snapshot import Snapshot
 from .interlocks import INTERLOCKS
 from .programs import WAVES
@@ -55,7 +55,8 @@ class PanelServer:
         self._sent: dict[str, int] = {}  # entries of the journal by browser
         machine = session.machine
         self._scene = LiveScene(machine, machine.name, self._window, bare=True)
-        self._capacity = plant_limits(make_plant(machine))
+        plant = make_plant(machine)
+        self._capacity, self._free = plant_limits(plant), [AXES[k] for k in plant.axes]
         self._number = 0
         self._last = np.zeros(session.layout.width)
 
@@ -142,13 +143,12 @@ class PanelServer:
     def _hello(self) -> dict[str, Any]:
         machine = self._session.machine
         limits = machine.limits
-        free = [AXES[k] for k in make_plant(machine).axes]
         return {
             "kind": "hello",
             "machine": machine.name,
             "axes": AXES,
             "units": {axis: "mm" if k < 3 else "deg" for k, axis in enumerate(AXES)},
-            "axes_free": free,
+            "axes_free": self._free,
             "actuators": machine.actuator_names,
             "waves": WAVES,
             "motions": [{"name": m.name, "title": m.title} for m in list_motions() if not m.remedy],
@@ -211,11 +211,10 @@ class PanelServer:
             "recordings": session.recordings,
             "faults": [_fault(name, on) for name, on in session.faults.items()] if self._trainer else [],
         }
-        time = float(self._last[3])
         found["program"] = {
             "name": status.program if status else None,
             "state": status.state if status else "stopped",
-            "time": time,
+            "time": session.layout.of(self._last[None], "program_time").item(),
             "duration": status.duration if status else None,
         }
         count = len(INTERLOCKS)
@@ -237,9 +236,7 @@ class PanelServer:
         force = of(row, "actuator_force")[0]
         if self._session.status is None:
             return {"force": {}, "pressure": {}, "spool": {}, "limits": {}}
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = force / np.where(force < 0.0, self._capacity["actuator_pull"], self._capacity["actuator_force"])
-            limits = of(row, "platen_displacement")[0] / self._capacity["displacement"]
+        limits, share = sample_shares(self._capacity, of(row, "platen_displacement")[0], force)
         supply = float(of(row, "supply_pressure")[0, 0])
         pressures: dict[str, float] = {}
         for letter in "ab":
@@ -272,13 +269,7 @@ def _named(names: Any, shares: Array) -> dict[str, float]:
 
 def _write(browser: Any, message: Mapping[str, Any]) -> None:
     """Send a browser one message, unless it is closing."""
-    from tornado.websocket import WebSocketClosedError
-
-    try:
-        written = browser.write_message(json.dumps(message))
-    except WebSocketClosedError:
-        return
-    written.add_done_callback(lambda done: done.cancelled() or done.exception())
+    write_message(browser, json.dumps(message))
 
 
 def _handlers(server: PanelServer) -> list[Any]:

@@ -1,6 +1,5 @@
 """The processes behind a panel: the controller in real time, and a plant of its own to command."""
 
-import logging
 import os
 import select
 import signal
@@ -18,6 +17,7 @@ from ..core.errors import LhpostError, LinkError, SimulationError
 from ..core.files import models_folder
 from ..interfaces.link import LinkClient, LinkMode, PlantState, Reading, ServedPlant, make_faults, open_socket, serve
 from ..interfaces.link.clock import undisturbed
+from ..interfaces.link.remote import refuse_other_machine
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters, load_parameters
 from ..mechanics.equilibrium import find_equilibrium, parked_pose
@@ -29,12 +29,8 @@ from .rows import Rows
 
 __all__ = ["Setup", "control", "panel_numbers", "rows_of", "serve_plant"]
 
-log = logging.getLogger(__name__)
-
-_IDLE, _SILENCE = (
-    0.1,
-    1.0,
-)  # [s] between looks at orders; without sensors until the link is lost
+_IDLE = 0.1  # [s] between looks at orders
+_SILENCE = 1.0  # [s] without sensors until the link is lost
 _OFTEN, _SELDOM = 64, 256  # samples between looks at orders, and at what is to be shown
 _KEEP = 2048  # samples between signs of life to a server that is not commanded
 _MOST_UNSEEN = 16  # messages to the page that it has not taken, from which on the next ones wait
@@ -46,6 +42,7 @@ class Setup(NamedTuple):
     machine: Machine
     settings: ControllerSettings
     ring: Path
+    pace: float = 1.0  # of the plant's clock
 
 
 class _Link:
@@ -85,7 +82,7 @@ def rows_of(machine: Machine) -> Rows:
 
 def control(pipe: Connection, setup: Setup) -> None:
     """Run the controller until the other end of the pipe is closed."""
-    _first()
+    _first(setup.pace)
     link = _Link(pipe)
     controller = _Controller(setup, link)
     with suppress(EOFError, OSError):
@@ -107,7 +104,7 @@ class _Controller:
         self._reading: Reading | None = None
         self._shown: Status | None = None
         self._offered: dict[str, bool] = {}
-        self._answered = self._kept = 0
+        self._kept = 0
         link.report("ready", None)
 
     def turn(self) -> None:
@@ -147,7 +144,6 @@ class _Controller:
         command = engine.answer(self._reading)
         if command is not None:
             client.send(command)
-            self._answered += 1
         elif engine.pressure == "high" and self._reading.sample - self._kept > _KEEP:
             client.keep()
             self._kept = self._reading.sample
@@ -157,8 +153,8 @@ class _Controller:
         """Take orders and, if it is to be, show the state."""
         if show and self._engine is not None and self._client is not None:
             status = self._engine.status
-            if self._shown is None or status._replace(program_time=0.0) != self._shown:
-                self._shown = status._replace(program_time=0.0)
+            if status != self._shown:
+                self._shown = status
                 self._link.report("status", status)
             if self._client.faults != self._offered:
                 self._offered = dict(self._client.faults)
@@ -200,33 +196,33 @@ class _Controller:
             self._answer(self._client, self._engine)  # a plant that waits for its first command sends nothing
 
     def _begin(self, host: str, port: int) -> None:
-        self._client = LinkClient(host, port, tries=10, pressures=True)
-        wanted = self._setup.machine
-        found = self._client.machine, self._client.actuators
-        if found != (wanted.name, wanted.actuator_names):
-            self._client.close()
-            self._client = None
-            raise LinkError(f"the server's machine is {found[0]}, the panel's {wanted.name}; choose --machine")
-        if self._client.mode == LinkMode.LOCK_STEP:
-            self._client.close()
-            self._client = None
-            raise LinkError("the server runs in lock-step; start it with --mode real-time")
-        self._reading, self._kept, self._answered = self._client.reading, 0, 0
+        client = LinkClient(host, port, tries=10, pressures=True)
+        try:
+            refuse_other_machine(client, self._setup.machine)
+            if client.mode == LinkMode.LOCK_STEP:
+                raise LinkError("the server runs in lock-step; start it with --mode real-time")
+        except LinkError:
+            client.close()
+            raise
+        self._client, self._reading, self._kept = client, client.reading, 0
         self._shown = None
         self._engine = Engine(self._plant, self._rest, self._setup.settings, self._numbers, self._rows)
         self._client.ask_faults()
         self._look()
 
     def _end(self) -> None:
-        """End the session; counts of the server go to the page."""
+        """End the session."""
         if self._client is not None:
-            self._link.report("ended", (self._client.close(), self._answered, self._client.sensors_lost))
+            self._client.close()
+            self._link.report("ended", None)
         self._client = self._engine = self._shown = None
 
 
-def _first() -> None:
-    """Come before other processes where the system allows it; Ctrl-C is for the page's process, which ends this one."""
+def _first(pace: float) -> None:
+    """In real time come before other processes where the system allows it; Ctrl-C is for the page's process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if pace < 1.0:
+        return
     with suppress(AttributeError, OSError):  # another system, or no right to it
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(os.sched_get_priority_min(os.SCHED_RR)))
 
@@ -247,7 +243,7 @@ def serve_plant(pipe: Connection, machine: Machine, faults: Sequence[str], pace:
 
     The platen is parked where the machine says how low.
     """
-    _first()
+    _first(pace)
     plant = make_plant(machine)
     rest = find_equilibrium(plant, None if machine.platen.parked is None else parked_pose(machine))
     served = ServedPlant(plant, rest, LinkMode.REAL_TIME, faults=make_faults(machine, faults))

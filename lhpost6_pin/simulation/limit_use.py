@@ -15,7 +15,8 @@ from ..mechanics.plant import Plant
 from ..motions import Peak
 
 __all__ = ["LIMIT_NAMES", "TOLERANCE", "ForceUse", "LimitUse", "Limits", "checked_limits", "force_use"]
-__all__ += ["governing_limits", "limit_uses", "plant_limits", "share_of_limit", "shares_of_limit", "uses_of_peaks"]
+__all__ += ["governing_limits", "limit_uses", "plant_limits", "sample_shares", "share_of_limit", "shares_of_limit"]
+__all__ += ["uses_of_peaks"]
 
 Limits = Mapping[str, Array]
 
@@ -79,6 +80,18 @@ def plant_limits(plant: Plant) -> Limits:
             "strut_area": [s.area for s in machine.struts],
         }
     )
+
+
+def sample_shares(limits: Limits, displacement: Array, force: Array) -> tuple[Array, Array]:
+    """Displacements (6,) over their limits, and forces (n_actuators,) over push or pull, of a sample (`plant_limits`).
+
+    Not-a-number or infinite where there is no capacity.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return (
+            displacement / limits["displacement"],
+            force / np.where(force < 0.0, limits["actuator_pull"], limits["actuator_force"]),
+        )
 
 
 def checked_limits(limits: Mapping[str, ArrayLike]) -> Limits:

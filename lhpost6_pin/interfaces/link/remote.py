@@ -17,6 +17,7 @@ from ...core.errors import LinkError
 from ...core.names import SAMPLE_RATE
 from ...core.progress import Progress
 from ...data.records import make_record
+from ...machine.machine import Machine
 from ...machine.recorded_specimen import specimen_facts
 from ...mechanics.coupled import BaseMotion
 from ...mechanics.instant import motion_at
@@ -29,7 +30,7 @@ from .clock import SECOND, now, undisturbed
 from .protocol import LinkMode, PlantState
 from .served import MISSED_FRAMES
 
-__all__ = ["LinkRun", "record_of_link_run", "run_over_link"]
+__all__ = ["LinkRun", "record_of_link_run", "refuse_other_machine", "run_over_link"]
 
 _CHUNK = 1024  # samples between two progress reports
 _LEAST = 2  # samples of a record
@@ -160,8 +161,7 @@ def _check(client: LinkClient, plant: Plant) -> None:
         raise LinkError("the plant has moved since this client connected; a run begins at rest: connect again")
     if np.linalg.norm(client.reading.motion.pose.translation) > _MICROMETRE:
         raise LinkError("the served platen is parked; a run begins in the zero-position: serve without --parked")
-    if (client.machine, client.actuators) != (machine.name, machine.actuator_names):
-        raise LinkError(f"the server's machine is {client.machine}, the controller's {machine.name}; choose --machine")
+    refuse_other_machine(client, machine)
     if not np.array_equal(client.counts, valve_counts(machine)):
         raise LinkError(
             f"the server's {client.machine} has {len(client.valves)} servovalves open, the controller's "
@@ -169,6 +169,12 @@ def _check(client: LinkClient, plant: Plant) -> None:
         )
     if client.rate != SAMPLE_RATE:
         raise LinkError(f"the server takes {client.rate:g} commands a second; the controller gives {SAMPLE_RATE}")
+
+
+def refuse_other_machine(client: LinkClient, machine: Machine) -> None:
+    """Raise LinkError if the server's machine is not the controller's."""
+    if (client.machine, client.actuators) != (machine.name, machine.actuator_names):
+        raise LinkError(f"the server's machine is {client.machine}, the controller's {machine.name}; choose --machine")
 
 
 def _stepper(plant: Plant, loop: ClosedLoop | PluggedLoop) -> Callable[[int, Feedback], Array]:

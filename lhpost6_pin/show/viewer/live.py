@@ -14,7 +14,7 @@ import pinocchio as pin
 from ...core.names import AXES
 from ...machine.machine import Machine
 from ...mechanics.plant import make_plant
-from ...simulation.limit_use import plant_limits
+from ...simulation.limit_use import plant_limits, sample_shares
 from ...simulation.snapshot import Snapshot, Watch
 from ..bodies import body_name, body_poses, joint_positions, load_bodies
 from ..urdf import legs
@@ -84,11 +84,8 @@ class LiveScene:
 
     def _meters(self, snapshot: Snapshot) -> dict[str, float]:
         """Displacements along the axes, and forces of the actuators, over their capacities; without one, none."""
-        push, pull = (self._limits[f"actuator_{way}"] for way in ("force", "pull"))
-        force = snapshot.force[: len(push)]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            forces = force / np.where(force < 0.0, pull, push)
-            displacements = snapshot.displacement / self._limits["displacement"]
+        actuators = len(self._machine.actuators)
+        displacements, forces = sample_shares(self._limits, snapshot.displacement, snapshot.force[:actuators])
         named = zip([*AXES, *self._machine.actuator_names], [*displacements, *forces], strict=True)
         return {name: round(float(np.clip(share, -9.99, 9.99)), 3) for name, share in named if not np.isnan(share)}
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = ["HOSTS", "LoopbackWindow", "Placed", "Recorder", "SharedWindow", "Window", "pack_command", "packed_array"]
+__all__ += ["write_message"]
 
 FLOAT_ARRAY = 0x17  # meshcat's msgpack extension type for a Float32Array
 LOOPBACK = "127.0.0.1"
@@ -121,14 +122,14 @@ class SharedWindow:
 
     def _hand_out(self, message: bytes | str) -> None:
         for browser in list(self._browsers):
-            _write(browser, message)
+            write_message(browser, message)
 
     def _welcome(self, browser: Any) -> None:
         with self._lock:
             self._browsers.add(browser)
             commands = list(self._commands.values())
         for packed in commands:
-            _write(browser, packed)
+            write_message(browser, packed)
         self._connected.set()
 
 
@@ -177,7 +178,7 @@ class LoopbackWindow(SharedWindow):
         await server.close_all_connections()
 
 
-def _write(browser: Any, message: bytes | str) -> None:
+def write_message(browser: Any, message: bytes | str) -> None:
     """Send a browser one message, unless it is closing: tornado raises at once, or in the future that it returns."""
     from tornado.websocket import WebSocketClosedError
 

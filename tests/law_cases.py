@@ -154,7 +154,7 @@ _ROWS = (
     _case("constant", 3e3),
     _case("stribeck", *_RUB, 0.02, z=(0.3,), cycle=0.005),
     _case("stribeck_lag", *_RUB[:2], 0.02, z=(0.3,), cycle=0.005),
-    _case("asymmetric", *_RUB, z=(0.3,)),
+    _case("asymmetric", *_RUB, 1.7, z=(0.3,)),
     _case("dahl_instead", *_RUB, 3e-4, z=(0.3, -0.4, 0.1, 0.5)),
     _case("dahl_instead", *_RUB, 3e-4, z=(0.3, 0.0, 0.1, 0.0), port="leg -"),
     _case("load_friction", 0.02, *_RUB[1:], 0.2, 0.13, z=(0.3, -0.4), on=DOUBLE, cycle=0.005),

@@ -254,7 +254,7 @@ def sine(axis: int = 0, frequency: float = 0.5):
 
 
 def test_the_platen_follows_a_wave_of_its_span_and_returns(table):
-    table.do("span", values=[0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    table.do("span", axis=0, value=0.1)
     table.do("load", sine())
     table.do("run")
     table.step(8.0)
@@ -282,7 +282,7 @@ def test_the_platen_follows_a_wave_of_its_span_and_returns(table):
 )
 def test_an_interlock_trips_to_safe_hold_within_five_milliseconds(table, name, limit, wave):
     table.do("interlock", name=name, limit=limit)
-    table.do("span", values=[0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    table.do("span", axis=0, value=0.1)
     if wave is None:  # a command that the valves cannot follow
         table.engine._interlocks._spool = 0.02
         wave = sine()
@@ -303,7 +303,7 @@ def test_an_interlock_trips_to_safe_hold_within_five_milliseconds(table, name, l
 
 
 def test_after_a_trip_the_platen_comes_to_rest_and_is_taken_over_where_it_is(table):
-    table.do("span", values=[0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    table.do("span", axis=0, value=0.1)
     table.do("load", sine())
     table.do("run")
     table.step(2.6)
@@ -326,7 +326,7 @@ def test_after_a_trip_the_platen_comes_to_rest_and_is_taken_over_where_it_is(tab
 
 
 def test_a_limit_that_is_still_passed_is_named_at_reset(table):
-    table.do("setpoint", values=[0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    table.do("setpoint", axis=0, value=0.1)
     table.step(3.0)
     table.do("interlock", name="displacement", limit=0.05)
     table.step(0.1)
@@ -337,6 +337,17 @@ def test_a_limit_that_is_still_passed_is_named_at_reset(table):
     table.do("reset")
     table.step(0.1)
     assert table.engine.trip == ""
+
+
+def test_orders_that_follow_each_other_at_once_keep_what_the_first_has_set(table):
+    """A page knows the state only as of its last message."""
+    for axis, value in ((0, 0.1), (2, 0.03)):
+        table.do("span", axis=axis, value=value)
+    for axis, value in ((1, 0.2), (5, 0.01)):
+        table.do("setpoint", axis=axis, value=value)
+    table.step(0.01)
+    assert table.engine.status.span == (0.1, 0.0, 0.03, 0.0, 0.0, 0.0)
+    assert table.engine.status.setpoint == (0.0, 0.2, 0.0, 0.0, 0.0, 0.01)
 
 
 def test_orders_out_of_turn_are_refused_with_what_to_do(machine):
@@ -429,8 +440,8 @@ def test_whatever_a_browser_sends_is_an_order_or_refused(orders, do, message, st
     except (LhpostError, KeyError, TypeError, ValueError):  # what `Session.take` answers with a refusal
         return
     assert order["do"] in (do, "load") and isinstance(order["what"], str)
-    if "values" in order:
-        assert len(order["values"]) == 6 and np.isfinite(order["values"]).all()
+    if do in ("setpoint", "span"):
+        assert order["axis"] in range(6) and np.isfinite(order["value"])
 
 
 def test_a_motion_by_name_is_written_for_the_controller(orders):

@@ -33,7 +33,8 @@ def best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least: 
     apart = _apart(found, fitted[left.index(lowest)])
     settled = _settled([fitted[i].power for i in passed], numbers.number("accept.settled"))
     needless = _needless(rivals, left, numbers.number("accept.simpler"))
-    alike = [i for i in passed if left[i] - lowest < apart and fitted[i].power <= settled and i not in needless]
+    near = _apart(found, fitted[left.index(lowest)], "accept.simplest")
+    alike = [i for i in passed if left[i] - lowest < near and fitted[i].power <= settled and i not in needless]
     alike = alike or [i for i in passed if left[i] == lowest]
     best = min(alike, key=lambda i: (_complexity(fitted[i], rivals[i].candidate), left[i]))
     order = sorted(range(len(left)), key=lambda i: (i != best, left[i]))
@@ -68,13 +69,14 @@ def _fits_of(found: Search, rivals: Sequence[Scored], parts: Sequence[Progress])
     return fitted
 
 
-def _apart(found: Search, best: Search) -> float:
+def _apart(found: Search, best: Search, share: str = "accept.alike") -> float:
     """Log-likelihood within which two families explain alike: of a large gain a small share is not decisive.
 
-    No real law is exactly that of the library.
+    No real law is exactly that of the library. Nor is the simpler of two the better one where it is behind by more than
+    the share `accept.simplest`: though not told apart, the other is then named first.
     """
     n = found.numbers.number
-    return max(n("accept.apart"), n("accept.alike") * (found.objective - best.objective))
+    return max(n("accept.apart"), n(share) * (found.objective - best.objective))
 
 
 def _settled(powers: Sequence[float], settled: float) -> float:

@@ -82,14 +82,14 @@ def forces_explained(found: Search) -> bool:
 def leaves_much(added: AddedEffect, kept: Sequence[AddedEffect], found: Search) -> bool:
     """Whether an effect leaves much of the residual unexplained in the columns where it explains most.
 
-    Compared with what all effects `kept` explain there.
+    Compared with what all effects `kept` explain there, each to the share that the error in its form may leave.
     """
     limit, doubt = (found.numbers.number(f) for f in ("verdict.unexplained", "accept.doubt"))
-    share = form_share(added.candidate.family, found.numbers)
     where = (added.fall > 0.1 * added.fall.max()) & ~_impacted(found)
     if forces_explained(found):
         where &= ~found.problem.rows("wrench")
-    fall = sum(np.maximum(one.fall, 0.0)[where].sum() for one in kept)
+    fall = [np.maximum(one.fall, 0.0)[where].sum() for one in kept]
+    of_form = sum(form_share(one.candidate.family, found.numbers) * f for one, f in zip(kept, fall, strict=True))
     left = squares_by_column(found.residual)[where]
     noise = float(sum(len(r) for r in found.residual) * left.size)
-    return bool(left.sum() > limit * noise and left.sum() - doubt * noise > share * fall)
+    return bool(left.sum() > limit * noise and left.sum() - doubt * noise > of_form)

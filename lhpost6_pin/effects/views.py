@@ -101,7 +101,7 @@ def view_viscous(numbers):
 @compiled_inline
 def view_asymmetric(numbers):
     """Parameters of `asymmetric`."""
-    return asymmetric.Friction(numbers[0], numbers[1], numbers[2])
+    return asymmetric.AsymmetricFriction(numbers[0], numbers[1], numbers[2], numbers[3])
 
 
 @compiled_inline

@@ -92,7 +92,7 @@ class Engine:
             "raise": lambda _: self._lift("raised", np.zeros(6)),
             "park": lambda _: self._lift("parked", np.array([0.0, 0.0, self._parked or 0.0, 0.0, 0.0, 0.0])),
             "setpoint": self._setpoint,
-            "span": lambda o: self._drive.set_span(np.asarray(o["values"], float), self._next),
+            "span": lambda o: self._drive.set_span(_with_axis(self._drive.span, o), self._next),
             "scale": lambda o: self._drive.set_scale(float(o["value"]), self._next),
             "load": lambda _: self._load(program),
             "run": self._run,
@@ -133,7 +133,7 @@ class Engine:
 
     def _setpoint(self, order: Mapping[str, Any]) -> None:
         self._ready(raised=True)
-        self._drive.move_setpoint(np.asarray(order["values"], float), self._next)
+        self._drive.move_setpoint(_with_axis(self._drive.setpoint, order), self._next)
 
     def _load(self, program: Program | None) -> None:
         _refuse(not self._free, "a program runs; stop it first")
@@ -260,6 +260,13 @@ class Engine:
         if not 0 <= at < len(self._block.value):
             self._block, self._first, at = self._drive.advance(sample, BLOCK), sample, 0
         return Moved(*(x[at] for x in self._block))
+
+
+def _with_axis(values: Array, order: Mapping[str, Any]) -> Array:
+    """Values (6,) with that of the axis that an order changes."""
+    changed = values.copy()
+    changed[int(order["axis"])] = float(order["value"])
+    return changed
 
 
 def _refuse(wrong: bool, why: str) -> None:

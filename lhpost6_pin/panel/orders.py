@@ -70,12 +70,11 @@ class Orders:
         limit = self._machine.limits.displacement[at] if at in self._plant.axes else 0.0
         if not abs(value) <= limit:
             raise ControllerError(f"{do} of {axis} is {value:g}; the displacement limit is {limit:g}")
-        values = np.array(getattr(status, do))
-        values[at] = value
         if self.program is not None and self.program.by_span:
-            wanted = {"span": np.array(status.span), "setpoint": np.array(status.setpoint), do: values}
+            wanted = {"span": np.array(status.span), "setpoint": np.array(status.setpoint)}
+            wanted[do][at] = value
             check_program(self._plant, self.program, wanted["span"], wanted["setpoint"])
-        return {"do": do, "values": values.tolist(), "what": f"sets the {do} of {axis} to {value:g} {_unit(axis)}"}
+        return {"do": do, "axis": at, "value": value, "what": f"sets the {do} of {axis} to {value:g} {_unit(axis)}"}
 
     def _scale(self, value: float, status: Status) -> dict[str, Any]:
         if self.program is not None and not self.program.by_span:

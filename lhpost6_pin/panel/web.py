@@ -233,11 +233,10 @@ class PanelServer:
 
     def _bars(self) -> dict[str, dict[str, float]]:
         of, row, names = self._session.layout.of, self._last[None], self._session.machine.actuator_names
-        force = of(row, "actuator_force")[0]
-        if self._session.status is None:
+        force, supply = of(row, "actuator_force")[0], float(of(row, "supply_pressure")[0, 0])
+        if self._session.status is None or supply == 0.0:  # no row has come yet
             return {"force": {}, "pressure": {}, "spool": {}, "limits": {}}
         limits, share = sample_shares(self._capacity, of(row, "platen_displacement")[0], force)
-        supply = float(of(row, "supply_pressure")[0, 0])
         pressures: dict[str, float] = {}
         for letter in "ab":
             column = of(row, f"chamber_pressure_{letter}")[0] / supply

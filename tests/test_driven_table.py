@@ -23,6 +23,7 @@ from lhpost6_pin.panel.programs import Recorded, make_wave
 from lhpost6_pin.panel.recording import Recording, record_of_rows
 from lhpost6_pin.panel.ring import ROWS, Ring, RingReader
 from lhpost6_pin.panel.rows import Rows
+from lhpost6_pin.panel.timekeeping import Timekeeping
 from lhpost6_pin.panel.worker import panel_numbers
 
 HIGHEST = 33.0
@@ -406,6 +407,25 @@ def test_samples_that_were_missed_repeat_the_row_before_and_a_new_session_is_ano
     assert record.sizes["time"] == 7
     assert record["answered"].values.tolist() == [1, 1, 1, 0, 0, 1, 1]
     assert record["platen_displacement"].values[:, 0].tolist() == [0.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0]
+
+
+@pytest.mark.fast
+def test_samples_are_counted_that_are_missed_or_come_late():
+    rows, rate = Rows(10, 3), SAMPLE_RATE * 0.5
+    samples = np.r_[0:3000, 3010:6000]  # ten missed
+    table = np.zeros((len(samples), rows.width))
+    delay = 7.0 + 0.3 / rate * (samples % 2)  # [s] of the clock's origin, and a scatter of less than a sample
+    delay[4000:4005] += 2.0 / rate
+    table[:, 0], table[:, 1] = samples, PlantState.RUNNING
+    table[:, rows.places["stamp"]] = (samples / rate + delay)[:, None]
+    table[5000:5100, 1] = PlantState.HOLD
+    found = Timekeeping(rows, 0.5)
+    for part in np.array_split(table, 37):
+        found.add(part)
+    assert (found.answered, found.missed, found.late, found.holds) == (5989, 10, 5, 1)  # the first sample begins
+    table[:, rows.places["stamp"]] *= 1.001  # a clock that is too slow
+    found.add(table)
+    assert found.late > 0.8 * len(samples) and found.share <= 1.0  # all but the first second of it
 
 
 @pytest.mark.fast

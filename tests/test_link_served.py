@@ -195,6 +195,20 @@ def strong_sine(plant, rest):
 
 
 @pytest.mark.parametrize("client", MOVING, indirect=True)
+def test_a_command_is_awaited_once_two_samples_have_come_without_one(client, rest):
+    client.command(rest.spool)
+    found = []
+    for _ in range(4):
+        found.append(client.table.awaited)
+        client.tick()
+    assert found == [False, True, False, False]  # nothing waits for a client that has stopped commanding
+    client.command(rest.spool)
+    client.tick()
+    client.say(client.frame(rest.spool))
+    assert not client.table.awaited  # it has come
+
+
+@pytest.mark.parametrize("client", MOVING, indirect=True)
 def test_four_missed_frames_are_bridged_and_the_fifth_begins_the_hold(client, rest):
     rows = spools(rest, 2)
     client.command(rows[0])

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from contextlib import contextmanager
 from unittest import mock
 
@@ -96,6 +97,20 @@ def wanted(samples, size=0.02):
     x = np.zeros((3, samples, 6))
     x[0, :, 0], x[1, :, 0], x[2, :, 0] = size * t**2, 2 * size * t, 2 * size
     return x
+
+
+def test_a_clock_that_waits_delays_the_plant_in_place_of_its_hold(plant, rest):
+    """A client that stops for 20 ms, forty samples, now and then."""
+    counts = {}
+    for patience in (0.0, 1.0):
+        served_plant = served(plant, rest, LinkMode.REAL_TIME, pace=0.2, patience=patience)
+        with served_plant as (_, address), LinkClient(*address) as client:
+            for k in range(100):
+                client.exchange(rest.spool)
+                time.sleep(0.02 if k % 20 == 19 else 0.0)
+            counts[patience] = client.close()
+    assert counts[0.0]["holds"] > 0 and counts[1.0]["holds"] == 0
+    assert counts[1.0]["missed_frames"] <= 100  # one at a time, of an answer on its way
 
 
 # -------------------------------------------------------------------------------------------------- the same run

@@ -80,7 +80,8 @@ def panel(
         finally:
             session.close()
     files = [Path(path) for path in session.recordings]
-    print_result(json, lambda: {"samples": session.answered, "late": session.missed}, lambda: None, files)
+    time = session.time
+    print_result(json, lambda: {"samples": time.answered, "late": time.missed + time.late}, lambda: None, files)
 
 
 def _address(text: str | None) -> tuple[str, int] | None:

@@ -24,7 +24,7 @@ class AsymmetricFriction(NamedTuple):
     power: Annotated[float, "1"]  # p > 0
 
 
-LAW = Law(AsymmetricFriction, states=("z",), amplitude=("friction",))
+LAW = Law(AsymmetricFriction, states=("z",), amplitude=("friction", "power"))
 
 
 @compiled

@@ -17,6 +17,7 @@ from ..core.errors import ControllerError
 from ..core.names import SAMPLE_RATE
 from ..data.metrics import QUANTITIES
 from ..interfaces.link import PlantState, Reading
+from ..interfaces.link.clock import SECOND
 from ..machine.parameters import Parameters
 from ..mechanics.equilibrium import Equilibrium
 from ..mechanics.plant import Plant
@@ -243,7 +244,7 @@ class Engine:
 
     def _fill(self, reading: Reading, now: Measured, wanted: Moved | None) -> None:
         row, places = self.row, self._rows.places
-        row[:3] = reading.sample, int(reading.state), self._drive.state(self._last).time
+        row[:4] = reading.sample, int(reading.state), self._drive.state(self._last).time, reading.stamp / SECOND
         for name, measured, reference in zip(QUANTITIES, now[:3], wanted or now[:3], strict=True):
             row[places[f"platen_{name}"]], row[places[f"reference_{name}"]] = measured, reference
         row[places["shares"]] = self._interlocks.shares

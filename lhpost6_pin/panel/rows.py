@@ -8,7 +8,7 @@ from .interlocks import INTERLOCKS
 
 __all__ = ["PRESSURES", "Rows"]
 
-STATE = ("sample", "plant_state", "program_time")
+STATE = ("sample", "plant_state", "program_time", "stamp")
 PRESSURES = ("chamber_pressure_a", "chamber_pressure_b", "spool_position", "strut_pressure", "supply_pressure")
 """In the order of a reading's."""
 
@@ -16,7 +16,8 @@ PRESSURES = ("chamber_pressure_a", "chamber_pressure_b", "spool_position", "stru
 class Rows:
     """Places of named columns in a row, for a plant of so many actuators and struts.
 
-    Pressures and spools are not-a-number where the server does not send them.
+    `stamp` [s] is the time on the plant's clock at which the sample was taken. Pressures and spools are not-a-number
+    where the server does not send them.
     """
 
     def __init__(self, actuators: int, struts: int) -> None:

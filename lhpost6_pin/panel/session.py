@@ -12,7 +12,6 @@ from ..core.arrays import Array
 from ..core.errors import ControllerError, LhpostError
 from ..data.records import save_record
 from ..data.sensors import SensorSet
-from ..interfaces.link import PlantState
 from ..simulation.simulated_campaign import SensorErrors, as_sensed
 from .engine import Status
 from .journal import Journal
@@ -20,6 +19,7 @@ from .orders import Orders, pressed
 from .processes import ControlProcess, PlantProcess
 from .recording import Recording, record_of_rows
 from .ring import RingReader
+from .timekeeping import Timekeeping
 from .worker import Setup, panel_numbers, rows_of
 
 __all__ = ["OPERATOR_ONLY", "Client", "Options", "Session"]
@@ -50,7 +50,8 @@ class Session:
     """A panel: its clients, the controller's process, and the plant's, unless a server elsewhere is driven.
 
     Attributes: clients by number; operator, one of them or None; status of the controller, None while the pressure is
-    off; journal; recording and recordings, the files of those that ended; news of the link.
+    off; journal; recording and recordings, the files of those that ended; news of the link; time, how
+    well the plant's clock is kept.
     """
 
     def __init__(
@@ -75,8 +76,7 @@ class Session:
         self.journal = Journal(folder / "journal.jsonl")
         self.recording: Recording | None = None
         self.recordings: list[str] = []
-        self.link, self.answered, self.missed, self._newest = "off", 0, 0, -1
-        self.holds, self._held = 0, False
+        self.link, self.time = "off", Timekeeping(self.layout, options.pace)
         self.server = "of its own" if server is None else f"{server[0]}:{server[1]}"
         self._orders = Orders(setup.machine, self._numbers, setup.ring.parent)
         self.faults: dict[str, bool] = {}
@@ -237,21 +237,10 @@ class Session:
             self._start_control()
         rows = self._ring.read()
         if len(rows):
-            self._count(rows)
+            self.time.add(rows)
         if self.recording is not None:
             self.recording.add(rows)
         return rows
-
-    def _count(self, rows: Array) -> None:
-        """Count samples that the controller answered, those that it missed, and safe holds."""
-        samples = rows[:, 0].astype(int)
-        steps = np.diff(samples, prepend=self._newest if samples[0] > self._newest >= 0 else samples[0])
-        self.answered += int(np.count_nonzero(steps > 0))
-        self.missed += int((steps[steps > 1] - 1).sum())
-        self._newest = int(samples[-1])
-        state = rows[:, 1] == PlantState.HOLD
-        self.holds += int(np.count_nonzero(state[1:] & ~state[:-1])) + int(state[0] and not self._held)
-        self._held = bool(state[-1])
 
     def _end(self) -> None:
         """Without a session there is no state, and no program."""

@@ -195,9 +195,9 @@ class PanelServer:
             "link": {
                 "ok": session.link == "on",
                 "word": session.link,
-                "late": session.missed / max(session.answered + session.missed, 1),
-                "samples": session.answered,
-                "holds": session.holds,
+                "late": session.time.share,
+                "samples": session.time.answered,
+                "holds": session.time.holds,
             },
             "pressure": status.pressure if status else "off",
             "platen": status.platen if status else "parked",

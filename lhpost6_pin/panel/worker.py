@@ -31,6 +31,7 @@ __all__ = ["Setup", "control", "panel_numbers", "rows_of", "serve_plant"]
 
 _IDLE = 0.1  # [s] between looks at orders
 _SILENCE = 1.0  # [s] without sensors until the link is lost
+_PATIENCE = 0.05  # [s] that the clock of a plant of its own waits for a command
 _OFTEN, _SELDOM = 64, 256  # samples between looks at orders, and at what is to be shown
 _KEEP = 2048  # samples between signs of life to a server that is not commanded
 _MOST_UNSEEN = 16  # messages to the page that it has not taken, from which on the next ones wait
@@ -257,5 +258,5 @@ def serve_plant(pipe: Connection, machine: Machine, faults: Sequence[str], pace:
     threading.Thread(target=wait, daemon=True).start()
     with open_socket(port=0) as sock:
         pipe.send(sock.getsockname())
-        serve(sock, served, stop=stop, pace=pace)
+        serve(sock, served, stop=stop, pace=pace, patience=_PATIENCE)
     os._exit(0)

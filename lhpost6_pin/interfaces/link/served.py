@@ -131,6 +131,14 @@ class ServedPlant:
         """Whether the plant moves by itself: it has a client and a first command, and it is not in lock-step."""
         return self.mode != LinkMode.LOCK_STEP and self._taken and self.state != PlantState.WAITING
 
+    @property
+    def awaited(self) -> bool:
+        """Whether no new command has come for two samples, but had for the one before them.
+
+        An answer may thus take two samples, as in real time, and nothing waits for a client that stopped commanding.
+        """
+        return self.state == PlantState.RUNNING and not self._fresh and self._missed == 1
+
     def receive(self, datagram: bytes, sender: Hashable, now: int) -> list[bytes]:
         """Take a datagram; returns what to send back to its sender. Never raises."""
         self.counts["received"] += 1

@@ -24,6 +24,7 @@ HOST, PORT = "127.0.0.1", 46946
 
 _IDLE = 0.1  # [s] longest wait before looking at the stop event
 _SPIN = 150_000  # [ns] before a deadline that are spent polling, not sleeping: sleep ends up to 0.1 ms late
+_BEHIND = 0.1  # [s] most that a clock that waits catches up with
 _LARGEST = 2048  # bytes of a datagram that are read; every frame is shorter
 _BURST = 64  # datagrams taken at most before the plant moves on
 
@@ -53,12 +54,15 @@ def serve(
     stop: threading.Event | None = None,
     seconds: float | None = None,
     pace: float = 1.0,
+    patience: float = 0.0,
 ) -> Timing:
     """Answer datagrams and move the plant until `stop` is set, Ctrl-C is pressed or `seconds` are over.
 
     Real time: sample k of a run is due k/2048 s after its first command came, whatever became of those before; `pace`
-    is a factor on the speed of that clock, below one for a computer that is too slow. The counts are in
-    `served.counts`. Raises LinkError for a time that is negative or not finite, or a pace that is not positive.
+    is a factor on the speed of that clock, below one for a computer that is too slow. With `patience` [s] it waits that
+    long for a command that is late by two samples, and catches up with at most 0.1 s afterwards: what a computer does
+    meanwhile, or is too slow for, then delays the plant, and does not bring it to its safe hold. The counts are
+    in `served.counts`. Raises LinkError for a time that is negative or not finite, or a pace that is not positive.
     """
     if not 0.0 < pace < math.inf:
         raise LinkError(f"a pace of {pace:g}; give a number above zero, 1 for real time")
@@ -81,7 +85,10 @@ def serve(
                     _tick(sock, served)
                     continue
                 due = begin + round(sample * SECOND / (SAMPLE_RATE * pace))
-                _listen_until(sock, served, due)
+                _listen_until(sock, served, due, _SPIN)
+                if patience and served.awaited:
+                    _await(sock, served, patience)
+                    begin += max(0, now() - due - round(_BEHIND * SECOND))
                 started = now()
                 _tick(sock, served)
                 ended = now()
@@ -100,13 +107,20 @@ def _tick(sock: socket.socket, served: ServedPlant) -> None:
         _send(sock, answer, client)
 
 
-def _listen_until(sock: socket.socket, served: ServedPlant, due: int) -> None:
-    """Receive until a time [ns], and what has arrived by then."""
+def _listen_until(sock: socket.socket, served: ServedPlant, due: int, spin: int = 0) -> None:
+    """Receive until a time [ns], the last of it (`spin` [ns]) by polling, and what has arrived by then."""
     while (left := due - now()) > 0:
-        _listen(sock, served, max(0, left - _SPIN) / SECOND)
+        _listen(sock, served, max(0, left - spin) / SECOND)
     for _ in range(_BURST):
         if not _listen(sock, served, 0.0):
             break
+
+
+def _await(sock: socket.socket, served: ServedPlant, seconds: float) -> None:
+    """Receive until an awaited command has come, or a time [s] is over."""
+    end = now() + round(seconds * SECOND)
+    while served.awaited and (left := end - now()) > 0:
+        _listen(sock, served, left / SECOND)
 
 
 def _listen(sock: socket.socket, served: ServedPlant, timeout: float) -> bool:

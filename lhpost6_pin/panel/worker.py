@@ -31,9 +31,10 @@ __all__ = ["Setup", "control", "panel_numbers", "rows_of", "serve_plant"]
 
 _IDLE = 0.1  # [s] between looks at orders
 _SILENCE = 1.0  # [s] without sensors until the link is lost
-_PATIENCE = 0.05  # [s] that the clock of a plant of its own waits for a command
-_OFTEN, _SELDOM = 64, 256  # samples between looks at orders, and at what is to be shown
+_PATIENCE = 0.2  # [s] that the clock of a plant of its own waits for a command
+_OFTEN, _SELDOM = 64, 4  # samples between looks at orders, and such looks between those at what is to be shown
 _KEEP = 2048  # samples between signs of life to a server that is not commanded
+_MOST_UNANSWERED = 4  # samples that are answered, of those that came meanwhile; older ones are missed
 _MOST_UNSEEN = 16  # messages to the page that it has not taken, from which on the next ones wait
 
 
@@ -119,16 +120,17 @@ class _Controller:
     def _session(self, client: LinkClient) -> None:
         """Answer sensors until the session ends."""
         assert self._engine is not None
-        silent, turns = 0.0, 0
+        silent, answered, looks = 0.0, 0, 0
         self._answer(client, self._engine)
         while self._client is client:
             commanded = self._engine.pressure == "high"
-            reading = client.wait(_IDLE if commanded else 0.02)
-            if reading is not None:
+            readings = client.wait(_IDLE if commanded else 0.02)
+            for reading in readings[-_MOST_UNANSWERED:]:
                 silent, self._reading = 0.0, reading
                 self._answer(client, self._engine)
-                turns += 1
-                if turns % _OFTEN and reading.state == PlantState.RUNNING:
+                answered += 1
+            if readings:
+                if answered < _OFTEN and readings[-1].state == PlantState.RUNNING:
                     continue
             elif commanded:
                 silent += _IDLE
@@ -138,7 +140,8 @@ class _Controller:
                     return
             else:
                 client.keep()
-            self._look(turns % _SELDOM == 0 or reading is None)
+            answered, looks = 0, looks + 1
+            self._look(looks % _SELDOM == 0 or not readings)
 
     def _answer(self, client: LinkClient, engine: Engine) -> None:
         assert self._reading is not None

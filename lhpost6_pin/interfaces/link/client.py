@@ -119,15 +119,20 @@ class LinkClient:
 
     def newest(self) -> Reading | None:
         """The newest sensors that have come since the last look, or None; does not wait."""
-        fresh = None
-        while (frame := self._get(0.0)) is not None:
-            fresh = self._take(frame) or fresh
-        return fresh
+        found = self._arrived()
+        return found[-1] if found else None
 
-    def wait(self, seconds: float) -> Reading | None:
-        """The newest sensors, once some have come, or None if none come within a time [s]."""
+    def wait(self, seconds: float) -> list[Reading]:
+        """All sensors that have come since the last look, once some have; none if none come within a time [s]."""
         select.select([self._sock], [], [], seconds)
-        return self.newest()
+        return self._arrived()
+
+    def _arrived(self) -> list[Reading]:
+        found = []
+        while (frame := self._get(0.0)) is not None:
+            if (reading := self._take(frame)) is not None:
+                found.append(reading)
+        return found
 
     def keep(self) -> None:
         """Keep the plant without commanding it: a server frees one whose client is silent for ten seconds."""

@@ -32,7 +32,7 @@ settings.register_profile("long", max_examples=4000, deadline=None)
 settings.load_profile("fixed")
 
 
-FIRST = ("test_discover", "test_ensemble", "test_friction_forms", "test_link_served", "test_calibration", "test_cli")
+FIRST = ("test_discover", "test_cli", "test_panel_page", "test_law_battery", "test_ensemble", "test_calibration")
 """The files that take longest: begun first, they leave no worker alone at the end."""
 
 

@@ -426,7 +426,7 @@ def test_a_file_that_holds_no_ensemble_is_named(tmp_path):
 
 
 @pytest.mark.long
-def test_the_command_runs_a_plan_and_writes_results_and_a_report(lhpost6, tmp_path):
+def test_the_command_runs_a_plan_and_writes_results_and_a_report(lhpost6, tmp_path, brief):
     (tmp_path / "two.toml").write_text(
         'machines = 4\nscales = [0.2, 0.4]\n[[motion]]\nname = "sine"\noptions = { cycles = 1.0, amplitude = 0.05 }\n'
     )

@@ -226,7 +226,7 @@ def test_what_is_wanted_must_fit_the_samples_and_be_finite_and_the_engine_run_py
             simulate(plant, PluggedLoop(Hold(), *wanted, rest), samples=8, engine=engine)
 
 
-def test_a_controller_runs_from_the_command_line_by_a_relative_path(lhpost6, file, monkeypatch):
+def test_a_controller_runs_from_the_command_line_by_a_relative_path(lhpost6, file, monkeypatch, brief):
     monkeypatch.chdir(file.parent)
     command = ("run", "sine", "--set", "amplitude=0.01", "--set", "cycles=1", "--controller", "mine.py:Hold")
     assert lhpost6(*command, "--out", "held").code == 0

@@ -25,7 +25,7 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 BROWSER = next((b for b in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if b), None)
 
 FLAGS = "--headless --no-sandbox --use-gl=swiftshader --enable-unsafe-swiftshader --hide-scrollbars"
-WAIT = 120.0  # [s] for the browser to start: this computer may be busy
+WAIT = 120.0  # [s] for all that is done with a page: this computer may be busy
 
 
 class Tab:
@@ -80,8 +80,14 @@ class Tab:
         path.write_bytes(base64.b64decode(printed["data"]))
 
 
-def browse(folder: Path, url: str, look: Callable[[Tab], Awaitable[Any]], size: tuple[int, int] = (1280, 800)) -> Any:
-    """What `look` makes of a page that has loaded; folder takes the browser's profile."""
+def browse(
+    folder: Path,
+    url: str,
+    look: Callable[[Tab], Awaitable[Any]],
+    size: tuple[int, int] = (1280, 800),
+    wait: float = WAIT,
+) -> Any:
+    """What `look` makes of a page that has loaded, within `wait` [s]; folder takes the browser's profile."""
     command = [str(BROWSER), *FLAGS.split(), f"--window-size={size[0]},{size[1]}", "--remote-debugging-port=0"]
     command += [f"--user-data-dir={folder / 'profile'}", "about:blank"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as browser:
@@ -90,7 +96,7 @@ def browse(folder: Path, url: str, look: Callable[[Tab], Awaitable[Any]], size: 
             port = next(
                 m[1] for line in browser.stderr if (m := re.search(r"listening on ws://127.0.0.1:(\d+)/", line))
             )
-            return asyncio.run(asyncio.wait_for(_visit(port, url, look, size), WAIT))
+            return asyncio.run(asyncio.wait_for(_visit(port, url, look, size), wait))
         finally:
             browser.kill()
 

@@ -5,9 +5,11 @@ the readers of `test_fuzz` take some ten minutes.
 """
 
 import sys
+from functools import cache
 
 import numpy as np
 import pytest
+import typer.main
 from commands import Ended
 from hypothesis import settings
 from machine_cases import machine_named
@@ -21,15 +23,16 @@ from lhpost6_pin.identification.prepare import MeasuredTest
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.motions import process
 from lhpost6_pin.show.bodies import load_bodies
 
 settings.register_profile("fixed", derandomize=True, deadline=None, max_examples=50)
 settings.register_profile("explore", max_examples=1000, deadline=None)
-settings.register_profile("long", max_examples=2000, deadline=None)
+settings.register_profile("long", max_examples=4000, deadline=None)
 settings.load_profile("fixed")
 
 
-FIRST = ("test_discover", "test_ensemble", "test_friction_forms", "test_link_served", "test_calibration", "test_cli")
+FIRST = ("test_discover", "test_cli", "test_panel_page", "test_law_battery", "test_ensemble", "test_calibration")
 """The files that take longest: begun first, they leave no worker alone at the end."""
 
 
@@ -43,10 +46,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("fast")
 
 
+commands_of = cache(typer.main.get_command)
+"""All commands of an application, which typer makes anew at each call: a fifth of a second."""
+
+
 @pytest.fixture
 def lhpost6(capsys, monkeypatch, tmp_path):
     """Run a command as the entry point does, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(typer.main, "get_command", commands_of)
 
     def run(*arguments: object) -> Ended:
         monkeypatch.setattr(sys, "argv", ["lhpost6", *map(str, arguments)])
@@ -57,6 +65,13 @@ def lhpost6(capsys, monkeypatch, tmp_path):
         return Ended(code if isinstance(code, int) else 0 if code is None else 1, *capsys.readouterr())
 
     return run
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    """Half a second of rest before and after a motion in place of four, which is most of a short run."""
+    known = process.processing()
+    monkeypatch.setattr(process, "processing", lambda: {**known, "pad": 0.5})
 
 
 @pytest.fixture(scope="session")

@@ -54,7 +54,7 @@ class Reader(NamedTuple):
     load: Callable[[Path], Any]
     use: Callable[[Any], object]
     breaks: Callable[[bytes], Breaks]
-    share: float = 1.0  # of a profile's examples; less for what is slow
+    share: float = 0.5  # of a profile's examples, each a whole file
 
     def broken(self) -> Breaks:
         return self.breaks(self.seed())

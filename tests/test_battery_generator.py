@@ -157,7 +157,7 @@ def test_a_table_drawn_anew_is_known_to_its_lab_and_follows_its_motions(tmp_path
             for key, value in entries.items():
                 if not isinstance(value, str):
                     np.testing.assert_allclose(lab[name][key], value, rtol=1e-12)
-        for test in case.tests:
+        for test in case.tests[seed % 2 :: 2]:  # by turns: four tables, each motion on two of them
             run = generate.run_test(case, test)
             assert np.abs(run.channels.spool).max() < 0.8
             assert np.abs(run.truth()["platen_displacement"] - run.reference).max(axis=0)[:3].max() < 0.02

@@ -26,6 +26,9 @@ from lhpost6_pin.simulation.simulate import OpenLoop, PluggedLoop, simulate
 PLATEN = 168e3  # [kg] of Table 4.1
 N = 256
 
+SLOW = pytest.mark.slow
+"""Of masses between the lightest and the heaviest."""
+
 
 def carrying(specimen, at=(0.0, 0.0, 0.0), turned=(0.0, 0.0, 0.0)) -> Machine:
     """The table with a supply that can carry ten platens."""
@@ -34,7 +37,7 @@ def carrying(specimen, at=(0.0, 0.0, 0.0), turned=(0.0, 0.0, 0.0)) -> Machine:
 
 @pytest.mark.long
 @pytest.mark.parametrize("free", [FULL, SHEAR], ids=["springs along x, y, z", "riding along z"])
-@pytest.mark.parametrize("ratio", [0.1, 1.0, 5.0, 10.0])
+@pytest.mark.parametrize("ratio", [0.1, pytest.param(1.0, marks=SLOW), pytest.param(5.0, marks=SLOW), 10.0])
 def test_towers_of_any_mass_follow_the_monolithic_equations(ratio, free):
     """The table's motion within 0.1 % of them at one exchange a sample, energy within 1e-4; no more at ten platens.
 

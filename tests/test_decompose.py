@@ -193,6 +193,7 @@ def test_the_command_leaves_ledger_and_report_and_says_what_is_left(lhpost6, tmp
     assert open_record(tmp_path / "ledger.nc").attrs["cutoff_hz"] == 20.0
 
 
+@pytest.mark.slow  # forty seconds at the rate of a record; test_report has as many samples on a page of a run
 def test_a_page_of_forty_seconds_stays_small(plant, tmp_path):
     record, _ = measured(plant, duration=40.0)
     noisy = add_noise(record, SENSORS, np.random.default_rng(0)).assign_attrs(kind="measured")

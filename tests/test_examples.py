@@ -2,10 +2,13 @@
 
 import json
 import re
+import runpy
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import Ended
 from machine_cases import PRACTICE, SCRIPTS
 from test_scripts import script
 
@@ -22,11 +25,31 @@ pytestmark = pytest.mark.long
 EXAMPLES = sorted(SCRIPTS.glob("example_*.py"))
 
 
-def run(number: int, *arguments: object) -> str:
-    (path,) = SCRIPTS.glob(f"example_{number}_*.py")
-    ended = script(path.name, *arguments)
-    assert ended.returncode == 0, ended.stderr
-    return str(ended.stdout)
+@pytest.fixture
+def here(monkeypatch, capsys):
+    """Run a script as a command does, but in this process: to load the package takes seconds."""
+
+    def run_here(path: Path, *arguments: object) -> Ended:
+        monkeypatch.setattr(sys, "argv", [str(path), *map(str, arguments)])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            runpy.run_path(str(path), run_name="__main__")
+        return Ended(int(end.value.code or 0), *capsys.readouterr())
+
+    return run_here
+
+
+@pytest.fixture
+def run(here):
+    """What an example prints, by its number."""
+
+    def run_example(number: int, *arguments: object) -> str:
+        (path,) = SCRIPTS.glob(f"example_{number}_*.py")
+        ended = here(path, *arguments)
+        assert ended.code == 0, ended
+        return ended.out
+
+    return run_example
 
 
 def test_every_example_is_run_here():
@@ -36,16 +59,16 @@ def test_every_example_is_run_here():
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
-def test_an_example_that_cannot_find_what_it_is_given_says_so_in_a_line(path):
+def test_an_example_that_cannot_find_what_it_is_given_says_so_in_a_line(here, path):
     if "control" in path.name:
         pytest.importorskip("control")
-    ended = script(path.name, "absent")
-    assert ended.returncode == 1 and ended.stdout == ""
-    assert re.fullmatch(r"error: .*\babsent\b.*\n", ended.stderr)
+    ended = here(path, "absent")
+    assert ended.code == 1 and ended.out == ""
+    assert re.fullmatch(r"error: .*\babsent\b.*\n", ended.err)
 
 
 @pytest.mark.slow
-def test_1_a_motion_is_rehearsed(tmp_path):
+def test_1_a_motion_is_rehearsed(run, tmp_path):
     said = run(1, "sine", "--scale", "0.2", "--out", tmp_path)
     assert [f for f in check_record(tmp_path / "record.nc") if f.severity == "error"] == []
     record = load_record(tmp_path / "record.nc")
@@ -56,7 +79,7 @@ def test_1_a_motion_is_rehearsed(tmp_path):
     assert str(tmp_path / "report.html") in said and (tmp_path / "report.html").is_file()
 
 
-def test_2_a_motion_of_ones_own_moves_a_specimen(tmp_path):
+def test_2_a_motion_of_ones_own_moves_a_specimen(run, tmp_path):
     said = run(2, "--scale", "0.5", "--out", tmp_path)
     bare, loaded = (load_record(tmp_path / f"{name}.nc") for name in ("bare", "loaded"))
     assert bare.attrs["specimen"] == "none" and loaded.attrs["specimen"] == "shear_frame"
@@ -67,17 +90,17 @@ def test_2_a_motion_of_ones_own_moves_a_specimen(tmp_path):
 
 
 def test_2_a_motion_that_does_not_fit_is_refused_with_the_scale_that_would(tmp_path):
-    ended = script("example_2_own_motion_and_specimen.py", "--scale", "5", "--out", tmp_path)
+    ended = script("example_2_own_motion_and_specimen.py", "--scale", "5", "--out", tmp_path)  # a process of its own
     assert ended.returncode == 1 and "largest scale that fits" in ended.stderr and "Traceback" not in ended.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["pulse.csv"]
 
 
-def test_3_a_record_is_taken_apart(tmp_path):
+def test_3_a_record_is_taken_apart(run, tmp_path):
     said = run(3, PRACTICE, "--out", tmp_path)
     assert "pad_friction: -" in said and {"ledger.nc", "report.html"} <= {p.name for p in tmp_path.iterdir()}
 
 
-def test_4_iterating_makes_the_table_follow_more_closely(tmp_path):
+def test_4_iterating_makes_the_table_follow_more_closely(run, tmp_path):
     said = run(4, "sine", "--scale", "0.2", "--machine", "uniaxial", "--most", "1", "--out", tmp_path)
     first, best = (float(x) for x in re.findall(r"iteration .*RRMSE x ([\d.]+) %", said))
     assert best < first
@@ -87,7 +110,7 @@ def test_4_iterating_makes_the_table_follow_more_closely(tmp_path):
 
 
 @pytest.mark.slow
-def test_5_lqg_is_compared_with_the_469d(tmp_path):
+def test_5_lqg_is_compared_with_the_469d(run, tmp_path):
     pytest.importorskip("control")
     said = run(5, "sine", "--scale", "0.2", "--axes", "x", "--out", tmp_path)
     panel, own = (float(x) for x in re.search(r"displacement x.*? ([\d.]+) %.*? ([\d.]+) %", said).groups())
@@ -98,7 +121,7 @@ def test_5_lqg_is_compared_with_the_469d(tmp_path):
 
 
 @pytest.mark.slow  # an ensemble
-def test_6_uncertain_numbers_give_an_interval(tmp_path):
+def test_6_uncertain_numbers_give_an_interval(run, tmp_path):
     said = run(6, "sine", "--scales", "0.1,0.2", "--machines", "4", "--out", tmp_path)
     assert "probability of a saturated valve at scale 0.2: 0%" in said
     rows = np.loadtxt(tmp_path / "forces.csv", delimiter=",", skiprows=1)
@@ -106,7 +129,7 @@ def test_6_uncertain_numbers_give_an_interval(tmp_path):
 
 
 @pytest.mark.slow  # the battery hides and finds effects in every run of the checks
-def test_7_a_hidden_effect_is_found(tmp_path):
+def test_7_a_hidden_effect_is_found(run, tmp_path):
     said = run(7, "bearing_thrust_direction", "--out", tmp_path)
     assert find_family("bearing_thrust_direction").title in said
     verdict = json.loads((tmp_path / "verdict.json").read_text())

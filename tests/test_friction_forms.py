@@ -237,7 +237,7 @@ def test_discover_names_the_backlash_and_nothing_else(loose):
     assert balance.explained is not None and balance.explained[2] > 0.99 > balance.explained[1]
 
 
-@pytest.mark.long
+@pytest.mark.slow  # a whole search; the one-axis battery has two cases that lack nothing in every run of the checks
 def test_discover_names_nothing_where_the_joint_is_tight(tight):
     machine, campaign, sensors = tight
     found = discover(machine, campaign, sensors, hold_out=["middle"], phases=(1,), propose=False)

@@ -504,7 +504,7 @@ def test_a_parked_table_with_faults_is_served_from_the_command_line(lhpost6, mon
     assert hello.numbers[6 + 4 : 6 + 10] == pytest.approx(np.full(6, -0.12), abs=1e-9)  # rounding of metres
 
 
-def test_a_motion_runs_across_processes_and_leaves_its_record(tmp_path, lhpost6):
+def test_a_motion_runs_across_processes_and_leaves_its_record(tmp_path, lhpost6, brief):
     command = [sys.executable, "-c", SERVE.format(["serve", "--port", "0", "--seconds", str(GUARD)])]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         try:
@@ -526,7 +526,7 @@ def test_a_motion_runs_across_processes_and_leaves_its_record(tmp_path, lhpost6)
     assert record.attrs["samples"] == record.sizes["time"] and str(tmp_path / "out") in ended.words.replace(" ", "")
 
 
-def test_a_users_own_controller_can_take_the_place_of_the_469d(tmp_path, lhpost6, port):
+def test_a_users_own_controller_can_take_the_place_of_the_469d(tmp_path, lhpost6, port, brief):
     own = own_controller(tmp_path / "mine.py")
     ended = lhpost6("link", *SHORT, "--port", port, "--controller", own)
     assert ended.code == 0, ended

@@ -116,8 +116,8 @@ def test_a_time_scale_that_cannot_be_is_refused(factor):
     ("name", "options", "damping"),
     [
         ("ridgecrest", {}, 0.05),
-        ("ridgecrest-clc", {}, 0.05),
-        ("white-noise", {"seed": 2}, 0.05),
+        pytest.param("ridgecrest-clc", {}, 0.05, marks=pytest.mark.slow),  # another station of the same earthquake
+        pytest.param("white-noise", {"seed": 2}, 0.05, marks=pytest.mark.slow),  # five seconds of processor time
         ("ridgecrest", {}, 0.10),
     ],
 )

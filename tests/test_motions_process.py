@@ -226,7 +226,7 @@ def test_a_target_at_exactly_its_limit_passes():
 
 
 def test_legs_limit_the_scale_although_their_length_is_not_linear_in_the_pose():
-    target = make_target(find_motion("sine", amplitude=0.5, period=2.0))
+    target = make_target(find_motion("sine", amplitude=0.5, period=2.0, cycles=0.5, ramp_cycles=0.5))
 
     # closed forms: sqrt(9.25) - 3 over 0.02 is 206.9 %; (0.5 s)^2 = 3.02^2 - 9, so s = 0.6940, rounded down
     said = r"fits is 0.69[34]; .*H1 actuator stroke 206.9 % of its stroke at t = .* s \(sample"

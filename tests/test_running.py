@@ -295,7 +295,7 @@ def test_a_live_view_is_no_faster_than_the_table(plant):
 
 
 @pytest.mark.long
-def test_a_run_can_be_watched_from_the_command_line(lhpost6, monkeypatch, tmp_path):
+def test_a_run_can_be_watched_from_the_command_line(lhpost6, monkeypatch, tmp_path, brief):
     monkeypatch.setattr(live, "PATIENCE", 0.0)
     ended = lhpost6("run", *SHORT, "--live", "--no-open", "--out", tmp_path)
     assert ended.code == 0 and "http://127.0.0.1:" in ended.out and "no viewer connected" in ended.err

@@ -87,6 +87,7 @@ def test_every_step_of_the_tuning_leads_to_the_settings_found(uniaxial):
     assert last["delay"].after == uniaxial.delay
 
 
+@pytest.mark.slow  # a whole tuning; that of unstable settings starts elsewhere, too, and ends at the same gain
 def test_tuning_again_from_its_own_result_finds_the_same(uniaxial):
     """It does not depend on where it starts from."""
     again = tune(uniaxial.machine, uniaxial.after)

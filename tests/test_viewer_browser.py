@@ -161,7 +161,14 @@ def moved(plant, show) -> None:
         table.advance(spool)
 
 
-@pytest.mark.parametrize("apart", [False, True], ids=["in one process", "in a process of its own"])
+@pytest.mark.parametrize(
+    "apart",
+    [
+        pytest.param(False, id="in one process"),
+        # loads the package once more; test_running watches a run of the command line, whose view is such a process
+        pytest.param(True, id="in a process of its own", marks=pytest.mark.slow),
+    ],
+)
 def test_a_live_view_follows_the_plant(plant, machine, tmp_path, apart):
     def view():
         return view_apart(machine, "live") if apart else LiveView(machine, "live", real_time=False)

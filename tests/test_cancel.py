@@ -1,5 +1,7 @@
 """Sine cancellers in any closed loop: the level they learn at, what they reach in `run`, what cannot be."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from commands import refused
@@ -13,7 +15,7 @@ from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.simulate import ClosedLoop, PluggedLoop
 from lhpost6_pin.tuning import cancel as module
 from lhpost6_pin.tuning import identify as identify_module
-from lhpost6_pin.tuning.cancel import cancelling, fundamental_level
+from lhpost6_pin.tuning.cancel import amplitude_at, cancelling
 from lhpost6_pin.tuning.sine import sine_target
 
 pytestmark = pytest.mark.long
@@ -27,13 +29,13 @@ def quick():
 
 def test_the_level_is_the_envelope_of_a_sine_and_nothing_of_another_frequency():
     target, envelope, _ = sine_target("x", 0.1, 1.0)
-    level = fundamental_level(target.displacement[:, 0], 1.0)
+    amplitude = amplitude_at(target.displacement[:, 0], 1.0)
     # mean over a cycle of an envelope that rises over three: a third of a cycle's rise at most
-    assert np.abs(level - envelope).max() < 0.1 and level.max() == 1.0
+    assert np.abs(amplitude / 0.1 - envelope).max() < 0.1 and amplitude.max() == pytest.approx(0.1, rel=1e-3)
     t = np.arange(20480) / 2048.0
     other = np.sin(2 * np.pi * 2.0 * t)
-    assert fundamental_level(np.zeros(100), 1.0).max() == 0.0
-    away = fundamental_level(np.sin(2 * np.pi * t) + other, 1.0)
+    assert amplitude_at(np.zeros(100), 1.0).max() == 0.0
+    away = amplitude_at(np.sin(2 * np.pi * t) + other, 1.0)
     inside = slice(2048, -2048)  # whole cycles
     assert np.ptp(away[inside]) < 0.01
 
@@ -52,6 +54,16 @@ def test_the_loop_has_the_drive_it_had_and_cancellers_of_its_harmonics(loop):
     assert np.array_equal(found.drive[:, :6], closed.drive) and found.drive.shape[1] == 13
     assert np.array_equal(found.drive[:, 6:12], target.acceleration)
     assert found.controller.canceller.size == 10 and found.controller.columns == 13
+
+
+def test_of_a_motion_that_is_no_sine_a_warning_says_how_little_there_is_to_cancel(loop, caplog):
+    closed, target = loop
+    x = target.displacement[:, 0]
+    cancelling(closed, target, "x=1")
+    assert not caplog.records
+    slow = 0.3 * np.sin(2.0 * np.pi * 0.1 * np.arange(len(x)) / 2048.0)
+    cancelling(closed, replace(target, displacement=target.displacement + np.outer(slow, np.eye(6)[0])), "x=1")
+    assert "of its largest displacement in x" in caplog.text
 
 
 @pytest.mark.parametrize(

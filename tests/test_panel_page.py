@@ -23,7 +23,7 @@ from lhpost6_pin.panel.worker import panel_numbers
 pytestmark = pytest.mark.long
 
 PACE = "0.9"
-"""Of real time: below it the panel's processes do not come before others; where the computer is busy its clock waits."""
+"""Of real time: below it the panel's processes do not come before others; on a busy computer its clock waits."""
 HERE = "0100007F"  # 127.0.0.1 in /proc/net
 PATIENCE = 120.0  # [s] for what takes seconds on a computer that does nothing else
 

@@ -624,6 +624,11 @@ def test_round_off_is_shown_as_zero_and_small_quantities_are_not():
     assert percent(1.09e-14).split() == ["0", "%"] and percent(float("nan")) == "–"
     assert shown_as(2.4e-6, Scale(1e3, "mm")).startswith("0.0024")
     assert scaled_number(float("nan"), Scale(1.0, "N")) == "–"
+    wave = np.sin(np.arange(50.0))
+    for size, all_zero in ((1e-10, True), (1e-7, False)):  # 1e-13 and 1e-10 kN
+        row = Row("Base shear y", [Trace("", size * wave, ACHIEVED)], Scale(1e-3, "kN"))
+        drawn = time_figure("f", "f", "f", [row], start=0.0, step=0.1).traces[0]["y"]["bdata"]
+        assert (not np.frombuffer(base64.b64decode(drawn), "<f4").any()) == all_zero
 
 
 @pytest.mark.long

@@ -6,6 +6,7 @@ The cancellers of `sine` learn on the wanted acceleration of the target, at the 
 of its displacement at that frequency over the cycle around each sample, over the largest.
 """
 
+import logging
 import math
 
 import numpy as np
@@ -19,7 +20,11 @@ from ..simulation.simulate import ClosedLoop, PluggedLoop
 from .identify import section, tuning_numbers
 from .sine import axis_row, with_cancellers
 
-__all__ = ["cancelling", "fundamental_level"]
+__all__ = ["amplitude_at", "cancelling"]
+
+_log = logging.getLogger(__name__)
+
+_SINE_LIKE = 0.5  # of the largest displacement, that the fundamental's amplitude reaches where a motion is a sine's
 
 
 def cancelling(loop: ClosedLoop | PluggedLoop, target: Target, sine: str) -> ClosedLoop:
@@ -44,21 +49,28 @@ def cancelling(loop: ClosedLoop | PluggedLoop, target: Target, sine: str) -> Clo
             f"--cancel {sine}: outside the table's band; choose a fundamental from {low:g} to {high:g} Hz"
         )
     axis_row(loop.controller.plant, axis)
-    level = fundamental_level(target.displacement[:, AXES.index(axis)], frequency)
-    if not level.any():
+    x = target.displacement[:, AXES.index(axis)]
+    amplitude, largest = amplitude_at(x, frequency), float(np.abs(x).max())
+    most = float(amplitude.max())
+    if most == 0.0:
         raise SimulationError(
             f"--cancel {sine}: the motion has nothing at {frequency:g} Hz in {axis}; name its own axis"
         )
+    if most < _SINE_LIKE * largest:
+        _log.warning(
+            f"--cancel {sine}: at {frequency:g} Hz the motion has at most {100.0 * most / largest:.2g} % of its "
+            f"largest displacement in {axis}; cancellers are for motions like a sine, and do little for this one"
+        )
     count = min(int(numbers.harmonics), int(high / frequency))
     controller = with_cancellers(loop.controller, axis, frequency, count, numbers.time_constant)
-    return loop._replace(controller=controller, drive=np.column_stack([loop.drive, target.acceleration, level]))
+    return loop._replace(
+        controller=controller, drive=np.column_stack([loop.drive, target.acceleration, amplitude / most])
+    )
 
 
-def fundamental_level(x: Array, frequency: float) -> Array:
-    """Amplitude (n,) of a signal at a frequency [Hz] over the cycle around each sample, over its largest; 0 to 1."""
+def amplitude_at(x: Array, frequency: float) -> Array:
+    """Amplitude (n,) of a signal at a frequency [Hz] over the cycle around each sample, in its unit."""
     turning = np.exp(-2j * np.pi * frequency / SAMPLE_RATE * np.arange(len(x)))
     cycle = max(1, round(SAMPLE_RATE / frequency))
     parts = [uniform_filter1d(part, cycle, mode="constant") for part in ((x * turning).real, (x * turning).imag)]
-    size = np.hypot(*parts)
-    most = float(size.max())
-    return size / most if most > 0.0 else np.zeros(len(x))
+    return 2.0 * np.hypot(*parts)

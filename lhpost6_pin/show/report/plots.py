@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...core.arrays import Array
 from .layout import ROW, axis_suffix, band_on, label_on, line_on, on_row, stacked_layout
 from .page import Figure
-from .scales import Scale
+from .scales import ROUND_OFF, Scale
 
 __all__ = [
     "ACHIEVED",
@@ -157,7 +157,10 @@ def _curve(trace: Trace, values: Array, factor: float, start: float, step: float
     dtype = next(code for code in ("u1", "u2", "u4") if jumps.max() <= np.iinfo(code).max)
     times = {"start": start, "step": step, "dtype": dtype, "bdata": _base64(jumps.astype(f"<{dtype}"))}
     line = {"type": "scatter", "mode": "lines", "name": html.escape(trace.name), "line": dict(trace.line)}
-    return line | {"x": times, "y": packed(values[kept] * factor)}
+    shown = values[kept] * factor
+    if np.all(np.abs(shown[np.isfinite(shown)]) < ROUND_OFF):
+        shown *= 0.0  # no axis in femtonewtons
+    return line | {"x": times, "y": packed(shown)}
 
 
 def packed(values: Array) -> dict[str, str]:

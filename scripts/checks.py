@@ -49,8 +49,7 @@ def main() -> int:
     with TemporaryDirectory() as folder, ThreadPoolExecutor() as beside:
         types = beside.submit(_run, ["-m", "mypy"], stdout=subprocess.PIPE, text=True)  # takes one core
         failed = [name for name, command in checks.items() if not _passes(name, command)]
-        for _ in beside.map(_compile, COMPILED, [f"{folder}/{k}" for k in range(len(COMPILED))]):
-            pass  # both have ended
+        list(beside.map(_compile, COMPILED, [f"{folder}/{k}" for k in range(len(COMPILED))]))  # until both have ended
         failed += ["tests"] * (not _passes("tests", [*TESTS, *chosen]))
         if not fast and not slow:
             # beside each other: the last case of one does not leave a core alone

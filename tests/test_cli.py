@@ -732,6 +732,7 @@ def test_the_entry_point_runs_and_its_errors_go_to_stderr(tmp_path):
     bad = process("run", "nonsense", cwd=tmp_path)
     assert bad.returncode == 2 and bad.stdout == ""
     assert bad.stderr.startswith("error: no ground motion named 'nonsense'") and "Traceback" not in bad.stderr
+    assert process("check", "absent.nc", cwd=tmp_path).returncode == 1
 
 
 def test_output_into_a_closed_pipe_ends_quietly():

@@ -100,7 +100,7 @@ def wanted(samples, size=0.02):
 
 
 def test_a_clock_that_waits_delays_the_plant_in_place_of_its_hold(plant, rest):
-    """A client that stops for 20 ms, forty samples, now and then."""
+    """A client that stops for 20 ms, eight samples at this pace, now and then."""
     counts = {}
     for patience in (0.0, 1.0):
         served_plant = served(plant, rest, LinkMode.REAL_TIME, pace=0.2, patience=patience)

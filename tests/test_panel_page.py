@@ -17,13 +17,12 @@ from browser import BROWSER, Tab, browse
 from tornado.websocket import websocket_connect
 
 from lhpost6_pin.data.records import load_record
-from lhpost6_pin.interfaces.link.served import MISSED_FRAMES
 from lhpost6_pin.panel.worker import panel_numbers
 
 pytestmark = pytest.mark.long
 
-PACE = "0.9"
-"""Of real time: below it the panel's processes do not come before others; on a busy computer its clock waits."""
+PACE = "0.15"
+"""Of real time: tests run beside others, and a table whose commands come a sample later moves otherwise."""
 HERE = "0100007F"  # 127.0.0.1 in /proc/net
 PATIENCE = 120.0  # [s] for what takes seconds on a computer that does nothing else
 
@@ -168,10 +167,7 @@ def test_a_table_is_started_driven_tripped_reset_and_recorded(panel):
     assert Path(recordings[0]).name == "by_hand.nc"
     wanted, x = (record[f"{who}_displacement"].values[:, 0] for who in ("reference", "platen"))
     assert np.abs(wanted).max() == pytest.approx(0.1, rel=0.01)
-    late = np.diff(np.flatnonzero(np.r_[True, record["answered"].values > 0, True])) - 1  # samples in a row
-    assert np.abs(x).max() > 0.05
-    if late.max() < MISSED_FRAMES and late.sum() < 0.01 * len(x):  # in safe holds the table moves otherwise
-        assert np.sqrt(np.mean((x - wanted) ** 2)) < 0.15 * np.sqrt(np.mean(wanted**2))
+    assert np.sqrt(np.mean((x - wanted) ** 2)) < 0.15 * np.sqrt(np.mean(wanted**2))
     assert {"chamber_pressure_a", "spool_position", "strut_pressure", "supply_pressure"} <= set(record.data_vars)
     said = "\n".join(log)
     for words in (

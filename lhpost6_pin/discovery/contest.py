@@ -30,10 +30,10 @@ def best_of(found: Search, rivals: Sequence[Scored], progress: Progress, least: 
     if not passed:
         return None
     lowest = min(left[i] for i in passed)
-    apart = _apart(found, fitted[left.index(lowest)])
+    leading = fitted[left.index(lowest)]
+    apart, near = _apart(found, leading), _apart(found, leading, "accept.simplest")
     settled = _settled([fitted[i].power for i in passed], numbers.number("accept.settled"))
     needless = _needless(rivals, left, numbers.number("accept.simpler"))
-    near = _apart(found, fitted[left.index(lowest)], "accept.simplest")
     alike = [i for i in passed if left[i] - lowest < near and fitted[i].power <= settled and i not in needless]
     alike = alike or [i for i in passed if left[i] == lowest]
     best = min(alike, key=lambda i: (_complexity(fitted[i], rivals[i].candidate), left[i]))

@@ -85,7 +85,7 @@ def serve(
                     _tick(sock, served)
                     continue
                 due = begin + round(sample * SECOND / (SAMPLE_RATE * pace))
-                _listen_until(sock, served, due, _SPIN)
+                _listen_until(sock, served, due)
                 if patience and served.awaited:
                     _await(sock, served, patience)
                     begin += max(0, now() - due - round(_BEHIND * SECOND))
@@ -107,10 +107,10 @@ def _tick(sock: socket.socket, served: ServedPlant) -> None:
         _send(sock, answer, client)
 
 
-def _listen_until(sock: socket.socket, served: ServedPlant, due: int, spin: int = 0) -> None:
-    """Receive until a time [ns], the last of it (`spin` [ns]) by polling, and what has arrived by then."""
+def _listen_until(sock: socket.socket, served: ServedPlant, due: int) -> None:
+    """Receive until a time [ns], and what has arrived by then."""
     while (left := due - now()) > 0:
-        _listen(sock, served, max(0, left - spin) / SECOND)
+        _listen(sock, served, max(0, left - _SPIN) / SECOND)
     for _ in range(_BURST):
         if not _listen(sock, served, 0.0):
             break

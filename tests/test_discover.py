@@ -27,7 +27,7 @@ from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_releases, with_background, with_other_form
 from lhpost6_pin.discovery.checkpoint import make_checkpoint
 from lhpost6_pin.discovery.contest import _apart, _complexity, _needless, _settled, loss_without
-from lhpost6_pin.discovery.discover import discovery_numbers
+from lhpost6_pin.discovery.discover import _sourced, discovery_numbers
 from lhpost6_pin.discovery.estimates import Absorbing, absorbing, amplitude_of, at_bounds, is_absorbed, moved_together
 from lhpost6_pin.discovery.floor import expected_gaps, model_at
 from lhpost6_pin.discovery.held_out import prove
@@ -58,6 +58,7 @@ from lhpost6_pin.discovery.search_state import (
     Round,
     Scored,
     Search,
+    fitted_machine,
     linearise,
 )
 from lhpost6_pin.discovery.searched_range import beyond_search, within_search
@@ -781,6 +782,18 @@ def test_the_share_that_an_effect_explains_is_of_residuals_in_which_it_shows(fou
 
     assert share("entrained_air") > 0.4 > 0.2 > share("spool_lag") > 0.0
     assert share("stribeck_friction") == 0.0  # the wrench is noise
+
+
+def test_a_search_without_its_effects_is_its_refit(found, rubbing):
+    """What a function that replaces all effects is delivered with."""
+    bare = found.search.bare
+    assert found.search.added and not bare.added
+    assert len(bare.problem.names) == len(bare.solution.x) < len(found.search.solution.x)
+    name = found.search.added[0].candidate.name
+    assert not [bounded for bounded in at_bounds(bare) if bounded.startswith(name)]
+    fitted = _sourced(fitted_machine(bare.solution), bare, found.machine, rubbing).parameters
+    assert name not in fitted.effects
+    assert "calibrated" in {quantity.evidence for quantity in fitted.quantities.values()}
 
 
 def test_a_residual_function_has_the_size_of_the_force_that_is_missing(found):

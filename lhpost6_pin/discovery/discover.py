@@ -17,7 +17,6 @@ from ..data.campaign import Campaign, SkippedTest
 from ..data.sensors import SensorSet
 from ..identification.calibration import calibration_numbers, usable_tests
 from ..identification.calibration.curves import Curves, measured_curves
-from ..identification.calibration.fit import Solution
 from ..identification.calibration.free_parameters import plan_parameters, scatter_parameters
 from ..identification.calibration.normal_equations import NormalEquations
 from ..identification.calibration.prepare import prepare_problem
@@ -145,12 +144,13 @@ def discover(
     tests_of_search = [one for one in (held_problem, begun.search.problem) if one is not None]
     bases = [residual_at(one, found.solution).base for one in tests_of_search] if found.added else []
     function = verdict.residual_function
-    final = found.refit if any(function is one for one in replacing) else found.solution
-    fitted = fitted_machine(final) if function is None else with_residual_function(fitted_machine(final), function)
+    final = found.bare if any(function is one for one in replacing) else found
+    fitted = fitted_machine(final.solution)
+    fitted = fitted if function is None else with_residual_function(fitted, function)
     return Discovery(
         campaign=campaign.name,
         machine=machine,
-        fitted=_sourced(fitted, replace(found, solution=final), machine, campaign),
+        fitted=_sourced(fitted, final, machine, campaign),
         used=tuple(name for name in names if name not in proven),
         held_out=proven,
         skipped=campaign.skipped,
@@ -165,7 +165,7 @@ def discover(
         hashes=hashes,
         residual_forces=forces,
         loops=effect_loops(found, bases, estimates_of(found, deviations(found))),
-        curves=_curves(tests_of_search[0], final, found),
+        curves=_curves(tests_of_search[0], final),
     )
 
 
@@ -245,10 +245,11 @@ def _sourced(fitted: Machine, found: Search, delivered: Machine, campaign: Campa
     return replace(fitted, parameters=replace(parameters, quantities=quantities, effects=effects))
 
 
-def _curves(problem: Problem, final: Solution, found: Search) -> Curves:
-    """Curves of a problem's tests as delivered, and by the final solution."""
-    after = "with the effects" if found.added and final is found.solution else "refitted"
-    return measured_curves({"as delivered": residual_at(problem).base, after: residual_at(problem, final).base})
+def _curves(problem: Problem, final: Search) -> Curves:
+    """Curves of a problem's tests as delivered, and at the end of a search."""
+    after = residual_at(problem, final.solution).base
+    name = "with the effects" if final.added else "refitted"
+    return measured_curves({"as delivered": residual_at(problem).base, name: after})
 
 
 def _begin(

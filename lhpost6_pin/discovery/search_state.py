@@ -116,6 +116,11 @@ class Search:
         solution = self.solution._replace(x=x, at=x, normal=normal.released(), residual=normal.residual)
         return replace(self, solution=solution, without={})
 
+    @property
+    def bare(self) -> "Search":
+        """The search at its refit, without any effect."""
+        return replace(self, problem=self.refit.normal.problem, solution=self.refit, added=(), without={})
+
     def with_effect(self, effect: AddedEffect) -> "Search":
         """The search with one more effect in its list."""
         return replace(self, added=(*self.added, effect))

@@ -111,9 +111,8 @@ def judge(
     outlying = tuple(outlying_parameters(found, sd, estimates))
     identified = [_of_added(one, estimates) for one in kept if one.candidate.name not in rejected | gone]
     effects = _merged([*identified, *outlying])
-    bare = replace(found, solution=found.refit, added=())
-    left = bare if gone and not effects and more_than_noise(bare) else found
-    if left is bare:  # what was withdrawn explains nothing, and without it the model does not either
+    left = found.bare if gone and not effects and more_than_noise(found.bare) else found
+    if left is not found:  # what was withdrawn explains nothing, and without it the model does not either
         unexplained, nearest = True, tuple(one.family for one in withdrawn)
     changed = {name: one for name, one in changed.items() if not any(name in other.parameters for other in outlying)}
     hidden, testable = _untestable(found)

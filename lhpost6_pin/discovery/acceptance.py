@@ -115,7 +115,8 @@ def gate(family: Family, numbers: Parameters) -> float:
 
 def form_share(family: Family, numbers: Parameters) -> float:
     """Share of what an effect explains up to which the residual is attributed to its form."""
-    return numbers.number("verdict.rest_friction" if family.confusable else "verdict.rest")
+    form = "rest_friction" if family.confusable else "rest_elastic" if family.elastic else "rest"
+    return numbers.number(f"verdict.{form}")
 
 
 def refusal(

@@ -192,6 +192,8 @@ def _family(family: Family, machine: Machine) -> str:
         facts.append(("in a search", "never a candidate: the form of an unexplained residual"))
     if family.confusable:
         facts.append(("in a search", "needs more gain: confusable with another form of a law of the report"))
+    if family.elastic:
+        facts.append(("in a search", "may leave less of the residual than others: a spring has no other form"))
     parts.append(table(("", ""), facts))
     rows = [
         (

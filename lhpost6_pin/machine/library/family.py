@@ -53,6 +53,7 @@ class Family:
     # in every search and never named; "unnamed": never a candidate
     search: str
     confusable: bool  # whether another form of the report's own laws may pass for it
+    elastic: bool  # whether it is a spring, alone or with a linear damper: what it leaves is no other form of it
     kind: str  # what families that are hard to tell apart have in common, in words; empty: none
     over: str  # state that it depends on, for figures; empty: time
     law: str  # whose parameters are the family's numbers and the component's; empty where `make` composes it
@@ -146,6 +147,7 @@ def _family(name: str, table: dict[str, Any], file: str) -> Family:
         sum_with=table.get("sum_with", ""),
         search=table.get("search", "named"),
         confusable=table.get("confusable", False),
+        elastic=table.get("elastic", False),
         kind=table.get("kind", ""),
         over=table.get("over", ""),
         law=table.get("law", ""),

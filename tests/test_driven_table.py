@@ -406,7 +406,7 @@ def test_samples_that_were_missed_repeat_the_row_before_and_a_new_session_is_ano
     record = record_of_rows(rows, layout, machine, {"test": "gaps"})
     assert record.sizes["time"] == 7
     assert record["answered"].values.tolist() == [1, 1, 1, 0, 0, 1, 1]
-    assert record["platen_displacement"].values[:, 0].tolist() == [0.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0]
+    assert record["platen_displacement"].values[:, 0].tolist() == [1.0, 2.0, 3.0, 3.0, 3.0, 4.0, 5.0]
 
 
 @pytest.mark.fast

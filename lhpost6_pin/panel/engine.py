@@ -81,6 +81,11 @@ class Engine:
         self._now = Measured(np.zeros(6), np.zeros(6), np.zeros(6), rest.force)
         self.row = np.full(rows.width, np.nan)
 
+    @property
+    def commanding(self) -> bool:
+        """Whether the plant is commanded."""
+        return self.pressure == "high" and not self.trip
+
     # ------------------------------------------------------------------------------------- orders
     def order(self, order: Mapping[str, Any], program: Program | None = None) -> None:
         """Do what a driver wants, from the next sample on that is not computed yet; a trip acts at once.
@@ -210,7 +215,7 @@ class Engine:
         self._now = now
         if reading.state == PlantState.TRIPPED:
             self.trip_by("the plant stopped: an actuator reached the end of its stroke, or the run diverged")
-        wanted = self._reference(sample) if self.pressure == "high" and not self.trip else None
+        wanted = self._reference(sample) if self.commanding else None
         if wanted is not None and (at := self._interlocks.look(now, self._command)) is not None:
             self.trip_by(self._interlocks.reason(at, sample / SAMPLE_RATE))
             wanted = None

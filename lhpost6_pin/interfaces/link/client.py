@@ -135,7 +135,10 @@ class LinkClient:
         return found
 
     def keep(self) -> None:
-        """Keep the plant without commanding it: a server frees one whose client is silent for ten seconds."""
+        """Keep the plant without commanding it: a server frees one whose client is silent for ten seconds.
+
+        One that waits for commands (`serve` with patience) waits no longer, and goes to its safe hold.
+        """
         self._put(Datagram(Kind.HELLO, self._session))
 
     def exchange(self, command: Array, wrench: ArrayLike | None = None) -> Reading:

@@ -1,5 +1,8 @@
 """A table that is driven by hand: moves, programs, the drive, interlocks and the controller, without processes."""
 
+import threading
+import time
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +12,19 @@ from lhpost6_pin.control import load_controller
 from lhpost6_pin.control.plug import Feedback
 from lhpost6_pin.core.errors import ControllerError, LhpostError, MotionError, OutOfRangeError
 from lhpost6_pin.core.names import SAMPLE_RATE
-from lhpost6_pin.interfaces.link import Datagram, Kind, LinkMode, PlantState, Reading, ServedPlant, decode, encode
+from lhpost6_pin.interfaces.link import (
+    Datagram,
+    Kind,
+    LinkClient,
+    LinkMode,
+    PlantState,
+    Reading,
+    ServedPlant,
+    decode,
+    encode,
+    open_socket,
+    serve,
+)
 from lhpost6_pin.interfaces.link.protocol import MOTION
 from lhpost6_pin.mechanics.coupled import motion_of_numbers
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
@@ -252,6 +267,41 @@ def table(machine):
 
 def sine(axis: int = 0, frequency: float = 0.5):
     return make_wave("sine", axes=(axis,), frequency=frequency, highest=HIGHEST)
+
+
+def test_a_wave_over_the_link_is_that_in_one_process_whatever_the_controller_s_delay(table, machine):
+    """At nine tenths of real time, and by a controller that stalls: motion and rows are the same to the last bit."""
+    table.do("span", axis=0, value=0.1)
+    table.do("load", sine(frequency=1.0))
+    table.do("run")
+    table.step(1.5)
+    rest = find_equilibrium(table.plant)
+    for stall in (0.0, 0.003):
+        served, stop = ServedPlant(table.plant, rest, LinkMode.REAL_TIME), threading.Event()
+        engine, rows = Engine(table.plant, rest, load_controller("lhpost6"), NUMBERS, table.rows), []
+        with open_socket(port=0) as sock:
+            options = {"stop": stop, "pace": 0.9, "patience": 60.0}
+            thread = threading.Thread(target=serve, args=(sock, served), kwargs=options)
+            thread.start()
+            with LinkClient(*sock.getsockname()) as client:
+                readings = [client.reading]
+                engine.answer(client.reading)
+                for do, more in (("pressure", {"to": "high"}), ("span", {"axis": 0, "value": 0.1})):
+                    engine.order({"do": do, **more})
+                engine.order({"do": "load"}, sine(frequency=1.0))
+                engine.order({"do": "run"})
+                while len(rows) < len(table.recording.rows()):
+                    for reading in readings:
+                        client.send(engine.answer(reading))
+                        rows.append(engine.row.copy())
+                        time.sleep(stall * (reading.sample % 50 == 7))
+                    readings = client.wait(1.0)
+            stop.set()
+            thread.join(60.0)
+        found, names = np.array(rows)[: len(table.recording.rows())], table.rows
+        for name in ("sample", "platen_displacement", "platen_acceleration", "actuator_force", "spool_command"):
+            assert np.array_equal(names.of(found, name), table.of(name)), name
+    assert np.abs(table.of("platen_displacement")[:, 0]).max() > 0.05
 
 
 def test_the_platen_follows_a_wave_of_its_span_and_returns(table):

@@ -76,7 +76,7 @@ class Engine:
         self._place, self._lifted, self._state = "raised", True, PlantState.WAITING
         self._memory = self._controller.init()
         self._command = rest.spool.copy()
-        self._block, self._first = Moved(*np.zeros((3, 0, 6))), 0
+        self._block, self._drives, self._first = Moved(*np.zeros((3, 0, 6))), np.zeros((0, 6)), 0
         self._last = 0
         self._now = Measured(np.zeros(6), np.zeros(6), np.zeros(6), rest.force)
         self.row = np.full(rows.width, np.nan)
@@ -221,9 +221,8 @@ class Engine:
             wanted = None
         command = None
         if wanted is not None:
-            drive = self._controller.drive_for(*(x[None] for x in wanted))
-            command = np.empty(len(self._command))
-            control_step(0, drive, reading.sensors, self._controller.plant.tables, self._tables, self._memory, command)
+            command, at = np.empty(len(self._command)), sample - self._first
+            control_step(at, self._drives, reading.sensors, self._controller.plant.tables, self._tables, self._memory, command)
             self._command = command
         self._fill(reading, now, wanted)
         return command
@@ -265,6 +264,7 @@ class Engine:
         at = sample - self._first
         if not 0 <= at < len(self._block.value):
             self._block, self._first, at = self._drive.advance(sample, BLOCK), sample, 0
+            self._drives = self._controller.drive_for(*self._block)
         return Moved(*(x[at] for x in self._block))
 
 

@@ -15,6 +15,7 @@ would need a plant for each pair, so one at a time is on.
 
 import logging
 from collections.abc import Hashable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -227,7 +228,7 @@ class ServedPlant:
         self._newest, self._newest_stamp = frame.sequence, frame.stamp
         self._answers, self._commanding = frame.acknowledged, True
         values = frame.numbers[: self._width]
-        self._asked = np.clip(per_actuator(values, self._valves, self._curves), -1.0, 1.0)
+        self._asked = per_actuator(values, self._valves, self._curves).clip(-1.0, 1.0)
         self._wrench = frame.wrench if frame.wrench is not None else self._wrench
         if frame.echo:
             self.answer_time.add(now - frame.echo)
@@ -304,5 +305,8 @@ class ServedPlant:
         """Sensors, motion of the interface and, if asked for, pressures in the order of their frame."""
         table = self._table
         sensors, motion = table.sensors(), motion_numbers(table.interface_motion())
-        pressures = table.pressures() if self._pressures else ()
-        return np.hstack([sensors.acceleration, sensors.displacement, sensors.force, motion, *pressures])
+        parts: tuple[Any, ...] = sensors.acceleration, sensors.displacement, sensors.force, motion
+        if self._pressures:
+            *pressures, supply = table.pressures()
+            parts += (*pressures, (supply,))
+        return np.concatenate(parts)

@@ -137,15 +137,16 @@ class Visitor:
             await self.until(lambda: self.state["recordings"])
 
 
-def replayed(record) -> np.ndarray:
-    """Displacement (n, 6) of a table that is driven from its parked position by a record's spool commands alone."""
+def replayed(record) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement (n, 6) of a parked table driven by a record's spool commands alone, and its spools (n, 10)."""
     plant = make_plant(load_machine())
     table = RunningPlant(plant, find_equilibrium(plant, parked_pose(plant.machine)))
-    found = [displacement_of(table.interface_motion().pose)]
-    for command in record["spool_command"].values[:-1].astype(float):
-        table.advance(command)
+    found, spools = [], []
+    for command in record["spool_command"].values.astype(float):
         found.append(displacement_of(table.interface_motion().pose))
-    return np.array(found)
+        table.advance(command)
+        spools.append(table.spool)
+    return np.array(found), np.array(spools)
 
 
 @unless_no_browser
@@ -187,7 +188,9 @@ def test_a_table_is_started_driven_tripped_reset_and_recorded(panel):
     assert panel.close() == 0
     start = load_record(recordings[0])
     # in single precision, as recordings are: 3e-8 of a stroke; a command that came a sample later moves it by 5e-5 m
-    np.testing.assert_allclose(replayed(start), start["platen_displacement"].values, rtol=0.0, atol=1e-6)
+    moved, spools = replayed(start)
+    np.testing.assert_allclose(moved, start["platen_displacement"].values, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(spools[:-1], start["spool_position"].values[:-1], rtol=0.0, atol=1e-7)
     assert start["answered"].values.all() and np.ptp(start["platen_displacement"].values[:, 2]) > 0.1
     record = load_record(recordings[1])
     assert Path(recordings[1]).name == "by_hand.nc"

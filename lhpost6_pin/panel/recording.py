@@ -76,7 +76,9 @@ def record_of_rows(rows: Array, layout: Rows, machine: Machine, attrs: Mapping[s
     labels = machine.labels
     if np.isfinite(layout.of(rows, "supply_pressure")).all():
         double = [name in machine.double_acting for name in machine.actuator_names]
-        channels |= {name: layout.of(rows, name) for name in ("chamber_pressure_a", "spool_position")}
+        channels["chamber_pressure_a"] = layout.of(rows, "chamber_pressure_a")
+        spool = layout.of(rows, "spool_position")  # a reading has its mean over the sample before, a record that after
+        channels["spool_position"] = np.concatenate([spool[1:], spool[-1:]])
         channels["supply_pressure"] = layout.of(rows, "supply_pressure")[:, 0]
         if any(double):
             channels["chamber_pressure_b"] = layout.of(rows, "chamber_pressure_b")[:, double]

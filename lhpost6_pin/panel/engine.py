@@ -221,8 +221,8 @@ class Engine:
             wanted = None
         command = None
         if wanted is not None:
-            command, at = np.empty(len(self._command)), sample - self._first
-            control_step(at, self._drives, reading.sensors, self._controller.plant.tables, self._tables, self._memory, command)
+            command, tables = np.empty(len(self._command)), (self._controller.plant.tables, self._tables)
+            control_step(sample - self._first, self._drives, reading.sensors, *tables, self._memory, command)
             self._command = command
         self._fill(reading, now, wanted)
         return command

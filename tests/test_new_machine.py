@@ -294,7 +294,7 @@ def test_limits_of_a_draft_are_printed_with_their_units(capsys, tmp_path):
 @pytest.mark.parametrize("cylinder", ["double-rod", "single-rod"])
 @pytest.mark.parametrize("given", [{}, {"area": None, "bore": "63 mm", "rod": "36 mm", "rated_drop": "7 MPa"}])
 def test_only_what_was_stated_is_marked_as_such(cylinder, given):
-    """As written: of the other numbers none is `measured`, and each that quotes the command says what was done to it."""
+    """Of the other numbers none is `measured`, and each that quotes the command states what was done to it."""
     texts = {name: text for name, text in {**KNOWN, **given}.items() if text is not None}
     machine = draft_machine("t", read_answers(texts), cylinder=cylinder)
     said = {name: answer.source for name, answer in read_answers(texts).items()}

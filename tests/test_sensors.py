@@ -13,10 +13,10 @@ from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.data.alignment import group_delays
 from lhpost6_pin.data.channels import LAYOUT, Channel, channel_unit, sensor_groups
 from lhpost6_pin.data.check import check_dataset
+from lhpost6_pin.data.conditioning import resolutions
 from lhpost6_pin.data.consistency import check_sensors
 from lhpost6_pin.data.importing.channel_map import channels_of
 from lhpost6_pin.data.records import load_record, make_record, save_record
-from lhpost6_pin.data.conditioning import resolutions
 from lhpost6_pin.data.sensors import SensorSet, add_noise, load_sensors, spectrum
 from lhpost6_pin.identification.calibration.sensor_errors import corrected, sensor_unknowns
 from lhpost6_pin.identification.prepare import AS_RECORDED, prepare_test

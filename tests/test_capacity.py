@@ -1,5 +1,6 @@
 """What the model can give against Table 2.2, and the oil-column modes of the linearised plant."""
 
+import json
 import re
 
 import numpy as np
@@ -231,3 +232,25 @@ def test_the_command_prints_the_capacity_of_a_table_without_table_2_2(lhpost6):
     assert ended.code == 0
     for words in ("peak force X 0.121 – MN", "peak velocity x 0.397 0.4 m/s", "x acceleration 2.04 g stated limit"):
         assert words in ended.words
+
+
+def test_modes_of_the_loaded_table_stand_beside_those_of_the_bare_one(lhpost6):
+    """A moving specimen is one rigid body in them: the modes of its joints are not those of the oil."""
+    ended = lhpost6("capacity", "--specimen", "pendulum", "--json")
+    found = json.loads(ended.out)
+    loaded = oil_column_modes(load_machine().with_specimen("pendulum"), loaded=True)
+    for key, modes in (("modes", oil_column_modes(load_machine())), ("loaded_modes", loaded)):
+        assert [(m["axis"], m["frequency"]) for m in found[key]] == [
+            (m.axis, pytest.approx(m.frequency, rel=1e-9))
+            for m in modes  # as printed
+        ]
+    slower = [
+        (a.axis, a.frequency < b.frequency)
+        for a in loaded
+        for b in oil_column_modes(load_machine())
+        if a.axis == b.axis
+    ]
+    assert len(slower) == 6 and dict(slower)["x"] and dict(slower)["y"]
+    words = lhpost6("capacity", "--specimen", "pendulum").words
+    assert "Oil-column modes with pendulum as one rigid body" in words and "Oil-column modes of the bare table" in words
+    assert json.loads(lhpost6("capacity", "--json").out)["loaded_modes"] == []

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.machine.parameters import load_parameters
 from lhpost6_pin.motions import response_spectrum
 from lhpost6_pin.show.ensemble_tables import ensemble_verdict, risk_table, spread_table
+from lhpost6_pin.show.report.ensemble_report import _headlines
 from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.studies import ensemble
 from lhpost6_pin.studies.draws import draw_machines
@@ -440,3 +442,27 @@ def test_the_command_runs_a_plan_and_writes_results_and_a_report(lhpost6, tmp_pa
     assert found["spreads"][0]["quantiles"][1] > 0.0
     other = lhpost6("ensemble", "sine", "--machines", 4, "--draw", "sobol", "--scales", "0.1;0.2")
     assert other.code == 2 and "write numbers with commas" in other.err
+
+
+def test_the_card_of_the_risk_is_of_the_worst_configuration():
+    """Three with 10, 40 and 20 % at the second scale; one alone is named without a count."""
+
+    def configuration(name: str, share: float) -> SimpleNamespace:
+        at = np.array([0.0, share])
+        return SimpleNamespace(
+            exceedances=[SimpleNamespace(share=at, low=0.9 * at, high=1.1 * at)],
+            motion=name,
+            specimen="none",
+            controller="own",
+        )
+
+    three = [configuration(name, share) for name, share in (("mild", 0.1), ("hard", 0.4), ("fair", 0.2))]
+    found = SimpleNamespace(runs=9, stopped=0, level=0.05, scales=[0.5, 1.0], configurations=three, shown_spreads=[])
+    _, card = _headlines(found, 1, 0)
+    assert card.value.startswith("40") and "hard, specimen none" in card.note and card.level == "attention"
+    assert card.note.endswith("the worst of 3 configurations")
+    found.configurations = three[:1]
+    _, card = _headlines(found, 1, 0)
+    assert card.value.startswith("10") and card.note.endswith("controller own")
+    found.configurations = []
+    assert len(_headlines(found, 1, 0)) == 1

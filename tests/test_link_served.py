@@ -198,17 +198,36 @@ def strong_sine(plant, rest, cycles=2):
 
 
 @pytest.mark.parametrize("client", MOVING, indirect=True)
-def test_a_command_is_awaited_once_two_samples_have_come_without_one(client, rest):
-    client.command(rest.spool)
-    found = []
-    for _ in range(4):
-        found.append(client.table.awaited)
-        client.tick()
-    assert found == [False, True, False, False]  # nothing waits for a client that has stopped commanding
-    client.command(rest.spool)
+def test_the_command_that_answers_the_newest_sensors_is_awaited_of_a_client_that_commands(client, rest):
+    table = client.table
+
+    def answer(sample):
+        client.say(client.frame(rest.spool)._replace(acknowledged=sample))
+
+    assert not table.awaited  # nothing moves before the first command
+    answer(0)
+    assert not table.awaited  # it has come
     client.tick()
-    client.say(client.frame(rest.spool))
-    assert not client.table.awaited  # it has come
+    assert table.awaited
+    answer(0)
+    assert table.awaited  # one more for the sample before
+    answer(1)
+    assert not table.awaited
+    client.tick()
+    assert table.awaited
+    client.tick()
+    assert not table.awaited  # a sample passed without one: the client has ceased to command
+    answer(3)
+    client.tick()
+    assert table.awaited
+    client.say(Datagram(Kind.HELLO, client.session))
+    assert not table.awaited  # and so does a client that says so
+    for _ in range(MISSED_FRAMES):
+        client.tick()
+    assert table.state == PlantState.HOLD and not table.awaited
+    answer(table.sample)
+    client.tick()
+    assert table.awaited  # it commands again
 
 
 @pytest.mark.parametrize("client", MOVING, indirect=True)

@@ -43,11 +43,13 @@ from lhpost6_pin.interfaces.link import (
 from lhpost6_pin.interfaces.link.clock import Histogram
 from lhpost6_pin.interfaces.link.link_summary import link_entries, print_link, too_slow
 from lhpost6_pin.interfaces.link.remote import LinkRun
+from lhpost6_pin.interfaces.link.served import MISSED_FRAMES
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.coupled import BaseMotion
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium, parked_pose
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import platen_motion
+from lhpost6_pin.simulation.running import RunningPlant
 from lhpost6_pin.simulation.simulate import ClosedLoop, PluggedLoop, simulate
 
 pytestmark = pytest.mark.long
@@ -100,17 +102,40 @@ def wanted(samples, size=0.02):
 
 
 def test_a_clock_that_waits_delays_the_plant_in_place_of_its_hold(plant, rest):
-    """A client that stops for 20 ms, eight samples at this pace, now and then."""
-    counts = {}
-    for patience in (0.0, 1.0):
-        served_plant = served(plant, rest, LinkMode.REAL_TIME, pace=0.2, patience=patience)
+    """A client that stops for 20 ms, forty samples, now and then, and for two in between: nothing of it is seen."""
+    counts, commands = {}, rest.spool + 0.02 * np.sin(0.1 * np.arange(120))[:, None]
+    for patience in (0.0, GUARD):
+        served_plant = served(plant, rest, LinkMode.REAL_TIME, patience=patience)
         with served_plant as (_, address), LinkClient(*address) as client:
-            for k in range(100):
-                client.exchange(rest.spool)
-                time.sleep(0.02 if k % 20 == 19 else 0.0)
+            found = []
+            for k, command in enumerate(commands):
+                found.append(client.exchange(command).sensors.displacement)
+                time.sleep(0.02 if k % 20 == 19 else 0.001 * (k % 2))
             counts[patience] = client.close()
-    assert counts[0.0]["holds"] > 0 and counts[1.0]["holds"] == 0
-    assert counts[1.0]["missed_frames"] <= 100  # one at a time, of an answer on its way
+    own, wanted = RunningPlant(plant, rest), []
+    for command in commands:
+        own.advance(command)
+        wanted.append(own.sensors().displacement)
+    assert counts[0.0]["holds"] > 0 and counts[0.0]["missed_frames"] > 100
+    assert counts[GUARD]["holds"] == counts[GUARD]["missed_frames"] == counts[GUARD]["superseded"] == 0
+    assert np.array_equal(found, wanted)  # sample for sample what was commanded
+
+
+def test_a_clock_that_waits_comes_to_its_hold_once_the_client_is_silent_or_states_that_it_commands_no_more(plant, rest):
+    for patience, keeps in ((0.05, False), (GUARD, True)):
+        served_plant = served(plant, rest, LinkMode.REAL_TIME, patience=patience)
+        with served_plant as (table, address), LinkClient(*address) as client:
+            for _ in range(10):
+                client.exchange(rest.spool)
+            if keeps:
+                client.keep()
+            end = time.monotonic() + 0.5 * GUARD
+            while table.counts["holds"] == 0:
+                assert time.monotonic() < end
+                time.sleep(0.001)
+            found = [client.reading, *client.wait(GUARD)]
+            first = next(reading.sample for reading in found if reading.state == PlantState.HOLD)
+            assert first - 10 == MISSED_FRAMES  # 2.4 ms of its own time
 
 
 # -------------------------------------------------------------------------------------------------- the same run

@@ -161,7 +161,7 @@ def test_every_number_that_tests_can_tell_has_a_wide_prior():
 def test_what_is_stated_derived_and_assumed_is_told_apart():
     numbers = draft_machine("small", read_answers(SMALL, 10.0)).parameters
     assert {p for p, q in numbers.items() if q.evidence == "measured"} == {
-        *("platen.mass", "drive.area_a", "drive.area_b", "drive.stroke"),
+        *("platen.mass", "drive.area_a", "drive.stroke"),
         *("hydraulics.supply_pressure", "hydraulics.return_pressure", "drive.full_command"),
     }
     assert numbers["drive.flow"].evidence == "derived" and "0.37 m/s/V" in numbers["drive.flow"].source
@@ -289,3 +289,21 @@ def test_templates_are_no_machines():
 def test_limits_of_a_draft_are_printed_with_their_units(capsys, tmp_path):
     print_draft(machine_named("uniaxial"), tmp_path / "m.toml")
     assert "x 0.15 m 0.4 m/s 20 m/s2" in " ".join(re.sub("[^!-~]", " ", capsys.readouterr().out).split())
+
+
+@pytest.mark.parametrize("cylinder", ["double-rod", "single-rod"])
+@pytest.mark.parametrize("given", [{}, {"area": None, "bore": "63 mm", "rod": "36 mm", "rated_drop": "7 MPa"}])
+def test_only_what_was_stated_is_marked_as_such(cylinder, given):
+    """Of the other numbers none is `measured`, and each that quotes the command states what was done to it."""
+    texts = {name: text for name, text in {**KNOWN, **given}.items() if text is not None}
+    machine = draft_machine("t", read_answers(texts), cylinder=cylinder)
+    said = {name: answer.source for name, answer in read_answers(texts).items()}
+    own = {"platen.mass": "mass", "drive.area_a": "area", "drive.stroke": "stroke"}
+    own |= {"hydraulics.supply_pressure": "supply_pressure"}
+    measured = {path for path, q in machine.parameters.items() if q.evidence == "measured"}
+    assert measured == {path for path, name in own.items() if name in texts}
+    for path, quantity in machine.parameters.items():
+        if path not in measured:
+            assert quantity.source not in said.values(), path
+    rated = machine.parameters["hydraulics.rated_pressure"]
+    assert rated.evidence == ("derived" if "rated_drop" in texts else "assumed")

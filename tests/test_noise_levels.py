@@ -132,7 +132,7 @@ def test_steps_of_a_converter_are_no_noise_of_the_sensor():
     extent = np.ptp([r["platen_displacement"].values for r in rounded])
     assert one.step == pytest.approx(step) and one.bits == pytest.approx(np.log2(extent / step), abs=1)
     assert one.sd(256.0)[0] == pytest.approx(3e-6, rel=3 * one.error[0])
-    assert one.quantum == pytest.approx(step**2 / 6 / 256)
+    assert one.quantum[0] == pytest.approx(step**2 / 6 / 256)
 
 
 def test_offsets_are_means_at_rest():

@@ -9,6 +9,7 @@ from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.identification.decompose import decompose_record
 from lhpost6_pin.show.notebook import show_report, show_summary
+from lhpost6_pin.show.report.run_limits import NOT_EVALUATED
 from lhpost6_pin.simulation.outputs import record_of_run
 from lhpost6_pin.simulation.rehearse import SimulatedTest
 
@@ -30,6 +31,17 @@ def test_a_run_is_judged_in_a_notebook_by_all_that_the_command_judges_by(machine
     page = show_report(SimulatedTest(run, record_of_run(run, {"test": "hard"}))).page
     assert "below the return pressure" in page or "below zero" in page  # a remark on the run
     assert "Performance curves" in page and "limits.valve_reserve" in page  # its loads and its numbers
+
+
+def test_a_bare_record_is_judged_by_the_machine_that_it_names(machine):
+    own = machine.with_params({"horizontal.leakage": {"value": 5.0, "unit": "l/min/MPa"}})
+    run = driven(own, np.full((600, len(machine.actuators)), 0.01))
+    record = record_of_run(run, {"test": "by name"})
+    page = show_report(record).page
+    assert "Performance curves" in page and "limits.valve_reserve" in page and NOT_EVALUATED not in page
+    assert "Limits are those of the shipped LHPOST6; the record was made with overrides: horizontal.leakage" in page
+    for attrs in ({"machine": "another"}, {"specimen": "gone", "specimen_file": "gone.urdf"}):
+        assert NOT_EVALUATED in show_report(record.assign_attrs(attrs)).page
 
 
 def test_what_has_no_report_is_refused():

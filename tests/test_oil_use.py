@@ -2,9 +2,13 @@
 
 import numpy as np
 import pytest
+from page_cases import Reader
 from run_cases import driven
 
-from lhpost6_pin.simulation.oil_use import oil_use
+from lhpost6_pin.core.errors import ParameterError
+from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.show.report.run_report import write_run_report
+from lhpost6_pin.simulation.oil_use import Bank, oil_use
 from lhpost6_pin.simulation.outputs import record_of_run
 
 STEP = 0.01
@@ -43,3 +47,35 @@ def test_a_run_draws_what_its_pistons_sweep(machine):
     assert drawn == pytest.approx(swept.sum() * step, rel=0.05)
     assert record["supply_flow"].attrs["pump_flow_evidence"] == "assumed"
     assert record["supply_flow"].attrs["accumulators"] == machine.parameters.number("power_supply.accumulators")
+
+
+def test_accumulators_give_what_lies_between_two_pressures_of_their_gas():
+    """By hand, for 10 m3 precharged to 10 MPa, charged to 20 MPa, down to 16 MPa: isothermal and adiabatic."""
+    bank = Bank(10.0, 10e6, 20e6, 16e6, 1.0)
+    assert bank.gas == 5.0 and bank.usable == pytest.approx(1.25)  # 10 (10/16 - 10/20)
+    assert bank._replace(gas_index=1.4).usable == pytest.approx(5.0 * (1.25 ** (1 / 1.4) - 1.0))
+    for index in (1.0, 1.4):
+        one = bank._replace(gas_index=index)
+        assert one.pressure_after(one.usable) == pytest.approx(16e6) and one.pressure_after(0.0) == 20e6
+
+
+def test_a_report_judges_oil_by_the_usable_volume(machine, tmp_path):
+    record = record_of_run(driven(machine, np.full((600, len(machine.actuators)), 0.02)), {"test": "oil"})
+    known = machine.power_supply
+    bank = Bank(known.accumulators, known.precharge, known.charged, known.lowest, known.gas_index)
+    assert 0.05 * known.accumulators < bank.usable < 0.15 * known.accumulators
+    flow = 0.5 + 0 * record["supply_flow"]  # far above the pumps'
+    taken = (0.5 - known.pump_flow) * float(record["time"][-1] - record["time"][0])
+    write_run_report(record.assign(supply_flow=flow.assign_attrs(record["supply_flow"].attrs)), tmp_path / "a.html")
+    words = Reader(tmp_path / "a.html").words
+    assert "usable volume of the accumulators, 20.7 to 17.6 MPa (assumed)" in words
+    assert f"share of it that is drawn {100 * taken / bank.usable:.3g}" in words.replace("  ", " ")
+    bare = {key: value for key, value in record["supply_flow"].attrs.items() if not key.startswith("lowest")}
+    record["supply_flow"].attrs = bare
+    write_run_report(record, tmp_path / "b.html")
+    assert "usable volume" not in Reader(tmp_path / "b.html").words
+
+
+def test_gas_pressures_out_of_order_are_refused():
+    with pytest.raises(ParameterError, match="precharge <= lowest < charged"):
+        load_machine().with_params({"power_supply.lowest": {"value": 1e7, "unit": "Pa"}})

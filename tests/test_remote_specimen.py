@@ -1,7 +1,10 @@
 """A specimen in another process: the same motion as in this one, whatever is lost on the way; and what is refused."""
 
+import json
 import socket
 import struct
+import subprocess
+import sys
 import threading
 from contextlib import contextmanager
 
@@ -226,6 +229,37 @@ def test_a_served_specimen_ends_after_its_time(lhpost6, tmp_path):
     )
     ended = lhpost6("serve-specimen", "mass.py:Mass", "--port", 0, "--seconds", 0.1)
     assert ended.code == 0 and "Mass listens at 127.0.0.1" in ended.out and "0 starts, 0 steps" in ended.out
+
+
+def test_a_served_specimen_that_is_terminated_prints_its_counts_and_keeps_what_it_wrote(tmp_path):
+    """SIGTERM, as a job scheduler or `kill` sends it; a buffered line of a file is lost if the process just ends."""
+    (tmp_path / "mass.py").write_text(
+        "import pinocchio as pin\n"
+        "class Mass:\n"
+        "    inertia = pin.Inertia.Zero()\n"
+        "    def init(self, base, gravity):\n"
+        "        self.file = open('history.txt', 'w')\n"
+        "        self.file.write('at rest')\n"
+        "        return None, pin.Force.Zero()\n"
+        "    def step(self, memory, base, dt): return pin.Force.Zero()\n"
+    )
+    command = [sys.executable, "-c", "from lhpost6_pin.cli import main; main()", "serve-specimen", "mass.py:Mass"]
+    command += ["--port", "0", "--json"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, cwd=tmp_path, **pipes) as server:
+        try:
+            port = int(server.stderr.readline().split("127.0.0.1:")[1].split(":")[0])
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as table:
+                table.settimeout(30.0)
+                message = Message(MessageKind.REST, 7, 1, np.asarray([9.8, *BASE], float))
+                table.sendto(encode_message(message), ("127.0.0.1", port))
+                table.recv(2048)
+            server.terminate()
+            out, _ = server.communicate(timeout=30.0)
+        finally:
+            server.kill()
+    assert server.returncode == 0 and json.loads(out)["rests"] == 1
+    assert (tmp_path / "history.txt").read_text() == "at rest"
 
 
 def test_a_busy_port_is_said(lhpost6, tmp_path):

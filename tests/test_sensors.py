@@ -13,6 +13,7 @@ from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.data.alignment import group_delays
 from lhpost6_pin.data.channels import LAYOUT, Channel, channel_unit, sensor_groups
 from lhpost6_pin.data.check import check_dataset
+from lhpost6_pin.data.conditioning import resolutions
 from lhpost6_pin.data.consistency import check_sensors
 from lhpost6_pin.data.importing.channel_map import channels_of
 from lhpost6_pin.data.records import load_record, make_record, save_record
@@ -79,6 +80,17 @@ def test_noisy_channels_are_recorded_with_the_stated_number_of_steps():
     steps = values / np.diff(np.unique(values)).min()
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)  # rounding of the quotient
     assert np.ptp(steps) <= 2**16
+
+
+def test_rotations_are_recorded_over_a_range_of_their_own():
+    """150 m along x in steps of 2 mm: noise of angles, some microradians, is finer by far, and keeps its own steps."""
+    record = add_noise(still(512.0, moves=1.0), SENSORS, np.random.default_rng(0))
+    moved = record["platen_displacement"].values
+    for kind in (slice(0, 3), slice(3, 6)):
+        step = np.ptp(moved[:, kind]) / (2**16 - 1)
+        assert resolutions(record["platen_displacement"])[kind] == pytest.approx([step] * 3, rel=1e-6)
+    own = SENSORS.noise_sd("platen_displacement")
+    assert moved[:, 3].std() == pytest.approx(own[3], rel=0.04)  # of so many independent values 0.8 %
 
 
 def test_the_resolution_adds_to_the_spectrum_of_a_coarse_channel():

@@ -11,6 +11,7 @@ from lhpost6_pin.data.signals import (
     align,
     correlation,
     delay,
+    delay_within,
     differentiate,
     drift_rate,
     lowpass_zero_phase,
@@ -98,6 +99,12 @@ def test_a_delay_has_a_sign_and_a_limit():
     waves = Waves(5)
     np.testing.assert_allclose(delay(waves(T - 0.03), waves(T), DT), -0.03, atol=1e-5)
     assert np.all(np.abs(delay(waves(T), waves(T - 0.03), DT, max_delay=0.01)) <= 0.01)
+
+
+def test_a_delay_at_the_end_of_the_range_is_none():
+    waves = Waves(5)
+    assert np.isnan(delay_within(waves(T), waves(T - 0.03), DT, 0.01)).all()
+    np.testing.assert_allclose(delay_within(waves(T), waves(T - 0.005), DT, 0.01), 0.005, atol=1e-5)
 
 
 def test_a_silent_signal_has_no_delay_and_a_short_record_is_refused():

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from machine_cases import PENDULUM, REFERENCE
+from page_cases import Reader
 from run_cases import closed_loop, sine_motion
 
 from lhpost6_pin.control import load_controller, make_controller
@@ -231,7 +232,7 @@ def test_a_mode_that_euler_amplifies_grows_in_simulation_as_it_says(plant, rest)
     )
 
 
-def test_a_run_that_diverges_prints_no_table_and_no_remark(plant, rest, capsys):
+def test_a_run_that_diverges_prints_and_reports_no_table_and_no_remark(plant, rest, capsys, tmp_path):
     target = make_target(find_motion("sine", amplitude=0.05, cycles=1), axes="x")
     options = {"scheme": "euler", "steps_per_second": SAMPLE_RATE, "engine": "fused"}
     test = rehearse(load_machine(), target, load_controller("lhpost6"), attrs={}, **options)
@@ -239,6 +240,11 @@ def test_a_run_that_diverges_prints_no_table_and_no_remark(plant, rest, capsys):
     print_run(test.run, write_test_report(test.run.plant, test.record, None, notes_of_run(test.run, [])))
     printed = " ".join(capsys.readouterr().out.split())
     assert "diverged before" in printed and "Peak" not in printed and "capacity" not in printed
+    write_test_report(test.run.plant, test.record, tmp_path / "report.html", notes_of_run(test.run, []))
+    page = Reader(tmp_path / "report.html")
+    assert "diverged before" in page.verdict[1] and "Why there are no results" in page.words
+    assert not page.figures and "Peak achieved" not in page.words and "Demand / capacity" not in page.words
+    assert "horizontal.leakage" in page.words and "spool_command" in page.words  # the machine, what the record holds
 
 
 @pytest.mark.parametrize(

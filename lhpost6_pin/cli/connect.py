@@ -1,6 +1,9 @@
-"""Commands that connect the virtual table to other programs: serve, link, export-fmu."""
+"""Commands that connect the virtual table to other programs: serve, serve-specimen, link, export-fmu."""
 
 import logging
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -29,6 +32,20 @@ log = logging.getLogger(__name__)
 __all__ = ["export_fmu", "link", "serve", "serve_specimen"]
 
 
+@contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """Let SIGTERM end a server as Ctrl-C does: with its counts, and the files of a specimen closed."""
+
+    def end(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 @command("export-fmu")
 def export_fmu(
     machine: SpecimenOptions,
@@ -54,7 +71,7 @@ def serve(
     mode: Annotated[str, typer.Option(help="lock-step, real-time, or free (as fast as possible).")] = "lock-step",
     host: Annotated[str, typer.Option(help="Address to listen on; default: this computer only.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="UDP port; 0: any free one.")] = 46946,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help=r"Duration \[s]; default: until Ctrl-C.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help=r"Duration \[s]; default: until ended.")] = None,
     parked: Annotated[bool, typer.Option("--parked", help="Start with the platen parked, not raised.")] = False,
     fault: Annotated[
         list[str] | None,
@@ -83,7 +100,7 @@ def serve(
         address, at = sock.getsockname()
         title = f"{table.name} at {address}:{at}"
         typer.echo(f"{table.name} listens at {address}:{at}, {mode}; Ctrl-C ends", err=json)
-        with watched(view, table, title, err=json, apart=True) as served.watcher:
+        with _terminated_as_interrupted(), watched(view, table, title, err=json, apart=True) as served.watcher:
             timing = serve_link(sock, served, seconds=seconds)
     times = {"lateness of samples": timing.lateness, "work per sample": timing.work}
     times |= {"answer of the client": served.answer_time}
@@ -96,7 +113,7 @@ def serve_specimen(
     specimen: Annotated[str, typer.Argument(help="FILE.py:NAME, a class or an OpenSees model.")],
     host: Annotated[str, typer.Option(help="Address to listen on; default: this computer only.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="UDP port; 0: any free one.")] = 46947,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help=r"Duration \[s]; default: until Ctrl-C.")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help=r"Duration \[s]; default: until ended.")] = None,
     json: Json = False,
 ) -> None:
     """Serve a specimen over UDP to a table in another process or on another computer (`--specimen udp:HOST:PORT`)."""
@@ -113,7 +130,8 @@ def serve_specimen(
         served = ServedSpecimen(made_specimen(described))
         address, at = sock.getsockname()
         typer.echo(f"{described.name} listens at {address}:{at}: --specimen udp:{address}:{at}; Ctrl-C ends", err=json)
-        serve_it(sock, served, seconds=seconds)
+        with _terminated_as_interrupted():
+            serve_it(sock, served, seconds=seconds)
     counts = {"rests": served.rests, "steps": served.steps}
     print_result(json, lambda: counts, lambda: typer.echo(f"{served.rests} starts, {served.steps} steps"))
 

@@ -214,6 +214,11 @@ def columns_of(variable: xr.DataArray) -> Array:
     return variable.values.astype(float).reshape(len(variable), -1)
 
 
+def kinds_of(variable: xr.DataArray) -> tuple[slice, ...]:
+    """Columns of a variable that share a unit, and so a recorder's range: translations and rotations, or all."""
+    return (slice(0, 3), slice(3, 6)) if "axis" in variable.dims else (slice(None),)
+
+
 def channel_name(variable: xr.DataArray, column: int) -> str:
     """Name of one column of a variable, as in `platen_displacement[yaw]`."""
     if variable.ndim < 2:

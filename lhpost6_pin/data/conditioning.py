@@ -1,11 +1,13 @@
 """Conditioning of measured channels: resolution, smoothing at rest, integrals. Time runs along the first axis."""
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from ..core.arrays import Array
+from .channels import columns_of, kinds_of
 
-__all__ = ["WIDTHS", "integrate", "quieted", "resolution"]
+__all__ = ["WIDTHS", "integrate", "quieted", "resolution", "resolutions"]
 
 
 def resolution(x: ArrayLike) -> float:
@@ -13,6 +15,15 @@ def resolution(x: ArrayLike) -> float:
     steps = np.abs(np.diff(np.asarray(x, dtype=float), axis=0))
     least = float(steps[steps > 0].min(initial=np.inf))
     return least if np.isfinite(least) else 0.0
+
+
+def resolutions(variable: xr.DataArray) -> Array:
+    """Digital resolution (k,) of each column of a variable: of translations, of rotations, or of all alike."""
+    x = columns_of(variable)
+    steps = np.empty(x.shape[1])
+    for kind in kinds_of(variable):
+        steps[kind] = resolution(x[:, kind])
+    return steps
 
 
 WIDTHS = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64)

@@ -116,7 +116,7 @@ def with_measured_noise(sensors: SensorSet, records: Sequence[xr.Dataset]) -> Se
     found, quantities = dict[str, float](), dict(sensors.parameters.quantities)
     for name, one in levels.channels.items():
         varies = one.density > 0
-        if one.density[varies].mean() < SHAKEN * one.quantum or _filtered(one, levels.rate, sensors):
+        if one.density[varies].mean() < SHAKEN * one.quantum[varies].mean() or _filtered(one, levels.rate, sensors):
             continue
         stated = float(_stated_density(one, levels.rate, sensors)[varies].mean())
         ratio = np.sqrt(one.density[varies].mean() / stated) if stated else 1.0
@@ -195,13 +195,14 @@ def compare_noise(levels: NoiseLevels, sensors: SensorSet | None) -> tuple[Noise
 
 def _compared(one: ChannelNoise, rate: float, sensors: SensorSet | None) -> NoiseComparison:
     six, varies = "axis" in LAYOUT[one.channel].dims, np.flatnonzero(one.density > 0)
-    own = one.density[varies]
-    measured, stated = (own if six else own.mean(keepdims=True)) + one.quantum, np.full(len(own), np.nan)
+    own, quantum = one.density[varies], one.quantum[varies]
+    measured, stated = own + quantum, np.full(len(own), np.nan)
+    measured = measured if six else measured.mean(keepdims=True)
     tolerance, filtered = 0.0, False
     if sensors is not None:
         filtered = _filtered(one, rate, sensors)
         stated = (_plateau(one, rate, sensors) if filtered else _stated_density(one, rate, sensors))[varies]
-        stated = np.where(stated > 0, stated + one.quantum, 0.0)
+        stated = np.where(stated > 0, stated + quantum, 0.0)
         tolerance = float(sensors.noise_range + 3 * one.error.max())
     stated = stated[: len(measured)]
     ratio = np.divide(measured, stated, out=np.full(len(measured), np.inf), where=stated > 0)

@@ -14,7 +14,7 @@ import xarray as xr
 
 from ..core.arrays import Array
 from ..core.errors import RecordError
-from .signals import Band, align, delay, rrmse
+from .signals import Band, align, delay_within, rrmse
 
 __all__ = [
     "QUANTITIES",
@@ -110,7 +110,8 @@ def commanded_axes(record: xr.Dataset) -> list[str]:
 def track(record: xr.Dataset, quantity: str, *, errors: bool = True) -> list[Tracking]:
     """Return the tracking of `quantity` on every axis; empty if the record has no such motion.
 
-    A delay is not-a-number where its removal does not reduce the error. Without `errors` only peaks are evaluated, not
+    A delay is not-a-number where its removal does not reduce the error, or where it is at the end of the range in which
+    it is sought. Without `errors` only peaks are evaluated, not
     RRMSE and delay, which take far longer.
     """
     if f"platen_{quantity}" not in record:
@@ -126,7 +127,7 @@ def track(record: xr.Dataset, quantity: str, *, errors: bool = True) -> list[Tra
         whole, late, without, shifted = np.nan, np.nan, np.nan, None
         if axis in commanded and np.isfinite(achieved[:, k]).all() and np.abs(target[:, k]).max() > SQUARED:
             whole = float(rrmse(target[:, k], achieved[:, k]))
-            late = float(delay(target[:, k], achieved[:, k], step, longest))
+            late = float(delay_within(target[:, k], achieved[:, k], step, longest))
             shifted = align(achieved[:, k], late, step) if np.isfinite(late) else achieved[:, k]
             without = float(rrmse(target[:, k], shifted))
             if without > whole:  # the motion differs by more than a delay, as one that is cut off in full shaking

@@ -16,7 +16,7 @@ from ..core.arrays import Array
 from ..machine.parameters import Parameters
 from .accelerometers import WEIGHTS
 from .channels import LAYOUT, columns_of
-from .conditioning import resolution
+from .conditioning import resolutions
 from .records import sample_interval
 from .rests import find_rests, rest_numbers, seconds_of
 from .signals import Band
@@ -37,7 +37,7 @@ class ChannelNoise(NamedTuple):
     error: Array  # (k,) relative standard error of its root
     offset: Array  # (k,) mean at rest [unit]; nan where there is no rest
     offset_spread: Array  # (k,) largest difference of the means of two rests [unit]
-    quantum: float  # density of the digital resolution [unit2/Hz], mean over records
+    quantum: Array  # (k,) density of the digital resolution [unit2/Hz], mean over records
     step: float  # digital resolution, the least of any record [unit]
     bits: float  # of its largest range over that resolution
     corner: float  # of its low-pass [Hz]; infinite where none shows
@@ -78,7 +78,7 @@ class _Pool:
         self.power: list[Array] = []  # (windows, bins, k) each
         self.means: list[Array] = []
         self.step, self.range = np.inf, 0.0
-        self.quantum: list[Array] = []  # (windows,) density of the resolution
+        self.quantum: list[Array] = []  # (k,) density of the resolution, of every window
 
 
 def noise_levels(records: Sequence[xr.Dataset], numbers: Parameters | None = None) -> NoiseLevels:
@@ -107,7 +107,7 @@ def noise_levels(records: Sequence[xr.Dataset], numbers: Parameters | None = Non
     flat: dict[str, tuple[float, float]] = {}
     for name, (mean, _) in spectra.items():
         plateau = (numbers.number("spectrum.lowest"), numbers.number("spectrum.plateau"))
-        found = plateau if at_rest else _flat_band(f, mean, float(np.mean(pools[name].quantum)), numbers, nyquist)
+        found = plateau if at_rest else _flat_band(f, mean, np.mean(pools[name].quantum, axis=0), numbers, nyquist)
         if found is not None:
             flat[name] = found
     most = numbers.number("spectrum.highest") * nyquist
@@ -140,8 +140,8 @@ def _add(pool: _Pool, record: xr.Dataset, name: str, slices: Sequence[slice], nu
 
     dt = sample_interval(record)
     values = columns_of(record[name])
-    step = resolution(values)
-    pool.step = min(pool.step, step or np.inf)
+    steps = resolutions(record[name])
+    pool.step = min(pool.step, steps.max() or np.inf)
     pool.range = max(pool.range, float(np.ptp(values, axis=0).max()))
     n = round(numbers.number("spectrum.window") / dt)
     taper = hann(n, sym=False)
@@ -153,7 +153,7 @@ def _add(pool: _Pool, record: xr.Dataset, name: str, slices: Sequence[slice], nu
         for start in range(0, len(x) - n + 1, n // 2):
             piece = detrend(x[start : start + n], axis=0) * taper[:, None]
             pool.power.append(2 * dt / np.sum(taper**2) * np.abs(np.fft.rfft(piece, axis=0))[None] ** 2)
-            pool.quantum.append(np.array([step**2 / 6 * dt]))
+            pool.quantum.append(steps**2 / 6 * dt)
 
 
 def _averaged(pool: _Pool, bins: int, share: float) -> tuple[Array, float]:
@@ -211,7 +211,7 @@ def _shared(
     shown = [name for name, corner in sensors.items() if np.isfinite(corner)]
     if 2 * len(shown) <= len(sensors):
         return None
-    own = {name: np.maximum(spectra[name] - np.mean(pools[name].quantum), 0.0) for name in shown}
+    own = {name: np.maximum(spectra[name] - np.mean(pools[name].quantum, axis=0), 0.0) for name in shown}
     shape = np.median([_relative(f, own[name], flat[name]) for name in shown], axis=0)
     used = (f >= np.median([flat[name][0] for name in shown])) & (f <= nyquist) & (shape > FIT[0])
     start = float(np.median([corners[name] for name in shown]))
@@ -225,11 +225,12 @@ def _shared(
 
 
 def _flat_band(
-    f: Array, mean: Array, quantum: float, numbers: Parameters, nyquist: float
+    f: Array, mean: Array, quantum: Array, numbers: Parameters, nyquist: float
 ) -> tuple[float, float] | None:
     """Band [Hz] of least power in which the spectrum is flat and above the digital resolution; None: nowhere."""
     width, most = numbers.number("spectrum.flat_width") * nyquist, numbers.number("spectrum.falling")
-    varying = mean[:, (mean > 0).any(axis=0)]
+    varies = (mean > 0).any(axis=0)
+    varying, quantum = mean[:, varies], quantum[varies]
     if not varying.size:
         return numbers.number("spectrum.lowest"), nyquist
     found = []
@@ -254,7 +255,7 @@ def _channel(
     used = (f >= band[0]) & (f <= band[1])
     density = _level(mean[used], count)
     density = np.where(density > ROUND_OFF * density.max(), density, 0.0)
-    quantum = float(np.mean(pool.quantum))
+    quantum = np.mean(pool.quantum, axis=0)
     own = np.where(density > 0, np.maximum(density - quantum, LEAST_OWN * quantum), 0.0)
     # a mean of chi-squares, whose median has 1.25 times its deviation; half of that is of the root
     whole = np.divide(density, own, out=np.zeros_like(own), where=own > 0)

@@ -9,7 +9,7 @@ import xarray as xr
 from ..core.arrays import Array
 from ..mechanics.plant import Plant
 from .channels import LAYOUT, columns_of
-from .conditioning import resolution
+from .conditioning import resolutions
 from .records import sample_interval
 from .sensors import SensorSet, spectrum
 from .signals import Band, differentiate
@@ -90,7 +90,7 @@ class RecordView:
 
     def sd(self, name: str) -> tuple[float, float, float]:
         """Calibration of a channel, one standard deviation: gain [1], offset [unit] with resolution, delay [s]."""
-        s, step = self.sensors, resolution(self.values(name)) if self.has(name) else 0.0
+        s, step = self.sensors, resolutions(self.record[name]).max() if self.has(name) else 0.0
         offset = float(np.hypot(s.offset_sd(name), step / np.sqrt(12.0)))
         return s.gain_sd(name), offset, s.delay_sd(LAYOUT[name].group or name)
 

@@ -19,8 +19,8 @@ from ..core.files import find_shipped
 from ..machine.accelerometers import ACCELEROMETER, accelerometers_of
 from ..machine.parameters import Parameters, load_parameters
 from .accelerometers import WEIGHTS
-from .channels import LAYOUT, columns_of, same_unit, sensor_groups
-from .conditioning import resolution
+from .channels import LAYOUT, columns_of, kinds_of, same_unit, sensor_groups
+from .conditioning import resolutions
 from .records import sample_interval
 from .signals import Band
 
@@ -142,9 +142,9 @@ def make_sensors(given: Parameters, stem: str = "sensors") -> SensorSet:
 def spectrum(sensors: SensorSet, record: xr.Dataset, channel: str, f: ArrayLike) -> Array:
     """Noise spectrum (n, columns) of a channel in this record: its sensor's, and that of its digital resolution."""
     values = columns_of(record[channel])
-    step = resolution(values)
+    steps = resolutions(record[channel])
     sensor, gain = _source(sensors, record[channel])
-    stated = sensors.noise_spectrum(sensor, f) * gain**2 + step**2 / 6 * sample_interval(record)
+    stated = sensors.noise_spectrum(sensor, f) * gain**2 + steps**2 / 6 * sample_interval(record)
     return np.broadcast_to(stated, (len(stated), values.shape[1]))
 
 
@@ -170,6 +170,7 @@ def _source(sensors: SensorSet, variable: xr.DataArray) -> tuple[str, Array]:
 def add_noise(record: xr.Dataset, sensors: SensorSet, rng: np.random.Generator) -> xr.Dataset:
     """Record with simulated noise on every channel that has any, recorded with the sensors' bits over its range.
 
+    Translations and rotations have a range of their own.
     The noise is Gaussian with the stated spectrum: white at the sensors' rate, low-passed, and sampled at the record's
     rate, whatever that is; what lies above half of it is folded down, as sampling does.
     """
@@ -178,8 +179,9 @@ def add_noise(record: xr.Dataset, sensors: SensorSet, rng: np.random.Generator) 
         if name in record:
             values, (sensor, gain) = columns_of(record[name]), _source(sensors, record[name])
             noisy = values + gain * _draw(sensors, sensor, values.shape, 1 / sample_interval(record), rng)
-            step = np.ptp(noisy) / (2**sensors.bits - 1)
-            noisy = step * np.round(noisy / step) if step > 0 else noisy
+            for kind in kinds_of(record[name]):
+                step = np.ptp(noisy[:, kind]) / (2**sensors.bits - 1)
+                noisy[:, kind] = step * np.round(noisy[:, kind] / step) if step > 0 else noisy[:, kind]
             channels[name] = record[name].copy(data=noisy.reshape(record[name].shape))
     return record.assign(channels).assign_attrs(noise=f"simulated: {sensors.name}")
 

@@ -18,6 +18,7 @@ __all__ = [
     "align",
     "correlation",
     "delay",
+    "delay_within",
     "differentiate",
     "drift_rate",
     "lag",
@@ -75,6 +76,12 @@ def delay(reference: ArrayLike, signal: ArrayLike, dt: float, max_delay: float =
         raise ValueError(f"max_delay {max_delay} s needs a record of at least {4 * margin * dt:g} s")
     columns = [_delay_samples(r, s, margin) for r, s in zip(_columns(ref).T, _columns(sig).T, strict=True)]
     return np.clip(dt * np.reshape(columns, ref.shape[1:]), -max_delay, max_delay)
+
+
+def delay_within(reference: ArrayLike, signal: ArrayLike, dt: float, max_delay: float) -> Array:
+    """As `delay`, and not-a-number where the best is at an end of the range: it may lie anywhere beyond."""
+    found = delay(reference, signal, dt, max_delay)
+    return np.where(np.abs(found) < max_delay, found, np.nan)  # the search goes a sample beyond
 
 
 def _delay_samples(ref: Array, sig: Array, margin: int) -> float:

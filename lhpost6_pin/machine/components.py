@@ -162,7 +162,14 @@ class Limits:
 
 @dataclass(frozen=True)
 class PowerSupply:
-    """Pumps and accumulators behind the supply, as far as they are stated; None where they are not."""
+    """Pumps and accumulators behind the supply, as far as they are stated; None where they are not.
+
+    The gas of the accumulators: pressure without oil, charged, and the lowest at which the table is to run.
+    """
 
     pump_flow: float | None = quantity_field("m3/s", bound="positive", optional=True)  # of all pumps
     accumulators: float | None = quantity_field("m3", bound="positive", optional=True)  # their volume
+    precharge: float | None = quantity_field("Pa", bound="positive", optional=True)
+    charged: float | None = quantity_field("Pa", bound="positive", optional=True)
+    lowest: float | None = quantity_field("Pa", bound="positive", optional=True)
+    gas_index: float | None = quantity_field("1", bound="positive", optional=True)  # of a test: 1.4 adiabatic

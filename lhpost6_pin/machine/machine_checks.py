@@ -8,7 +8,7 @@ from .components import Accelerometer, Actuator, Floor, Hydraulics, Limits, Plat
 from .parameters import Parameters
 from .structure import Structure
 
-__all__ = ["check_actuator", "check_machine", "check_names"]
+__all__ = ["check_actuator", "check_machine", "check_names", "check_supply"]
 
 _COMPARISONS = ("estimates", "table_2_2", "table_2_2_payload")
 """Sections of numbers to compare with; their keys are free."""
@@ -52,6 +52,14 @@ def check_names(parameters: Parameters, components: list[str], kinds: set[str], 
         if key not in known[section]:
             hint = instead_of(key, sorted(known[section]))
             raise ParameterError(f"{parameters.origin}: unknown key {path}; {hint}")
+
+
+def check_supply(supply: PowerSupply, origin: str) -> None:
+    """Refuse gas pressures of accumulators that are out of order."""
+    given = (supply.precharge, supply.lowest, supply.charged)
+    if None not in given and not supply.precharge <= supply.lowest < supply.charged:  # type: ignore[operator]
+        words = ", ".join(f"{value:g}" for value in given)
+        raise ParameterError(f"{origin}: power_supply: precharge <= lowest < charged is needed [Pa]; got {words}")
 
 
 def check_actuator(actuator: Actuator, origin: str) -> None:

@@ -59,7 +59,7 @@ def motion_numbers(base: BaseMotion) -> Array:
 
 def motion_of_numbers(numbers: Array) -> BaseMotion:
     """Motion of a base from the numbers of `motion_numbers`."""
-    pose = pin.SE3(pin.rpy.rpyToMatrix(*numbers[3:6]), numbers[:3])
+    pose = pin.SE3(pin.rpy.rpyToMatrix(numbers[3:6]), numbers[:3])
     return BaseMotion(pose, pin.Motion(numbers[6:12]), pin.Motion(numbers[12:18]))
 
 

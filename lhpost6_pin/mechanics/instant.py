@@ -36,7 +36,7 @@ def displacement_of(pose: pin.SE3) -> Array:
 def motion_at(pose: pin.SE3, twist: pin.Motion) -> tuple[Array, Array]:
     """Displacement and velocity (6,) of C in {s} and Euler angles, of a pose and the twist at C in platen axes."""
     displacement = displacement_of(pose)
-    turning = np.linalg.solve(pin.rpy.computeRpyJacobian(displacement[3:], pin.LOCAL), twist.angular)
+    turning = pin.rpy.computeRpyJacobianInverse(displacement[3:], pin.LOCAL) @ twist.angular
     return displacement, np.concatenate([pose.rotation @ twist.linear, turning])
 
 
@@ -57,7 +57,7 @@ def legs_at(plant: Plant, pose: pin.SE3, twist: pin.Motion | None = None) -> tup
     rates = np.zeros(6)
     if twist is not None:
         rates[:3] = twist.linear
-        rates[3:] = np.linalg.solve(pin.rpy.computeRpyJacobian(displacement[3:], pin.WORLD), twist.angular)
+        rates[3:] = pin.rpy.computeRpyJacobianInverse(displacement[3:], pin.WORLD) @ twist.angular
     s, rate = leg_displacements(plant, displacement, rates)
     return s[0], rate[0]
 

@@ -25,7 +25,7 @@ def base_motion(plant: Plant, ws: Workspace, placement: pin.SE3) -> BaseMotion:
         pose = pin.SE3(np.eye(3), np.array(plant.machine.platen.centre_of_gravity) + moved[:3])
     twist = placement.actInv(pin.Motion(v[0]))
     spatial = placement.actInv(pin.Motion(v[1]))
-    classical = pin.Motion(spatial.linear + pin.skew(twist.angular) @ twist.linear, spatial.angular)
+    classical = pin.Motion(pin.classicAcceleration(twist, spatial), spatial.angular)
     return BaseMotion(pose * placement, twist, classical)
 
 

@@ -76,10 +76,15 @@ class Engine:
         self._place, self._lifted, self._state = "raised", True, PlantState.WAITING
         self._memory = self._controller.init()
         self._command = rest.spool.copy()
-        self._block, self._first = Moved(*np.zeros((3, 0, 6))), 0
+        self._block, self._drives, self._first = Moved(*np.zeros((3, 0, 6))), np.zeros((0, 6)), 0
         self._last = 0
         self._now = Measured(np.zeros(6), np.zeros(6), np.zeros(6), rest.force)
         self.row = np.full(rows.width, np.nan)
+
+    @property
+    def commanding(self) -> bool:
+        """Whether the plant is commanded."""
+        return self.pressure == "high" and not self.trip
 
     # ------------------------------------------------------------------------------------- orders
     def order(self, order: Mapping[str, Any], program: Program | None = None) -> None:
@@ -210,15 +215,14 @@ class Engine:
         self._now = now
         if reading.state == PlantState.TRIPPED:
             self.trip_by("the plant stopped: an actuator reached the end of its stroke, or the run diverged")
-        wanted = self._reference(sample) if self.pressure == "high" and not self.trip else None
+        wanted = self._reference(sample) if self.commanding else None
         if wanted is not None and (at := self._interlocks.look(now, self._command)) is not None:
             self.trip_by(self._interlocks.reason(at, sample / SAMPLE_RATE))
             wanted = None
         command = None
         if wanted is not None:
-            drive = self._controller.drive_for(*(x[None] for x in wanted))
-            command = np.empty(len(self._command))
-            control_step(0, drive, reading.sensors, self._controller.plant.tables, self._tables, self._memory, command)
+            command, tables = np.empty(len(self._command)), (self._controller.plant.tables, self._tables)
+            control_step(sample - self._first, self._drives, reading.sensors, *tables, self._memory, command)
             self._command = command
         self._fill(reading, now, wanted)
         return command
@@ -260,6 +264,7 @@ class Engine:
         at = sample - self._first
         if not 0 <= at < len(self._block.value):
             self._block, self._first, at = self._drive.advance(sample, BLOCK), sample, 0
+            self._drives = self._controller.drive_for(*self._block)
         return Moved(*(x[at] for x in self._block))
 
 

@@ -85,10 +85,8 @@ class Orders:
         """A wave on axes that have a span."""
         axes = tuple(AXES.index(str(axis)) for axis in message["axes"])
         given = {key: float(message[key]) for key in ("cycles", "to", "duration") if message.get(key) is not None}
-        highest = self._numbers.number("generator.highest")
-        wave = make_wave(
-            str(message["wave"]), axes=axes, frequency=float(message["frequency"]), highest=highest, **given
-        )
+        given |= {name: self._numbers.number(f"generator.{name}") for name in ("highest", "reversal")}
+        wave = make_wave(str(message["wave"]), axes=axes, frequency=float(message["frequency"]), **given)
         still = [AXES[k] for k in axes if status.span[k] == 0.0]
         if still:
             raise ControllerError(f"the span of {', '.join(still)} is zero; set one first")

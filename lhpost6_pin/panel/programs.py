@@ -110,14 +110,16 @@ def make_wave(
     axes: tuple[int, ...],
     frequency: float,
     highest: float,
+    reversal: float,
     cycles: float | None = None,
     to: float | None = None,
     duration: float | None = None,
 ) -> Wave:
     """Wave of the function generator; `cycles` of it (None: until stopped), for a sweep `to` and `duration`.
 
-    Frequencies are at most `highest` [Hz]; a triangle has its odd harmonics up to there. Raises MotionError for what
-    cannot be.
+    Frequencies are at most `highest` [Hz]. A triangle turns round with the acceleration of half a sine in the share
+    `reversal` of its period [1], as `motions.triangle` does, and has its odd harmonics up to `highest`. Raises
+    MotionError for what cannot be.
     """
     if wave not in WAVES:
         raise MotionError(f"no wave named {wave!r}; choose {', '.join(WAVES)}")
@@ -135,6 +137,19 @@ def make_wave(
         return Wave(f"sweep {frequency:g} to {to:g} Hz", axes, frequency, duration, to=to)
     harmonics: tuple[tuple[int, float], ...] = ((1, 1.0),)
     if wave == "triangle":
-        orders = range(1, int(highest / frequency) + 1, 2)
-        harmonics = tuple((n, 8.0 / np.pi**2 * (-1) ** (n // 2) / n**2) for n in orders)
+        harmonics = _triangle(int(highest / frequency), reversal)
     return Wave(f"{wave} {frequency:g} Hz", axes, frequency, None if cycles is None else cycles / frequency, harmonics)
+
+
+def _triangle(most: int, reversal: float) -> tuple[tuple[int, float], ...]:
+    """Odd harmonics up to the order `most` of a triangle convolved with half a sine; its peak is one."""
+    orders = range(1, most + 1, 2)
+    signs = [(-1) ** (n // 2) for n in orders]
+    sizes = [_half_sine(n * reversal) / n**2 for n in orders]
+    return tuple((n, sign * size / sum(sizes)) for n, sign, size in zip(orders, signs, sizes, strict=True))
+
+
+def _half_sine(x: float) -> float:
+    """Fourier transform of half a period of a sine of unit area, at its duration times the frequency."""
+    left = 1.0 - 4.0 * x * x
+    return 0.25 * math.pi if abs(left) < 1e-9 else math.cos(math.pi * x) / left

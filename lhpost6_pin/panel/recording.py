@@ -52,6 +52,7 @@ class Recording:
 def record_of_rows(rows: Array, layout: Rows, machine: Machine, attrs: Mapping[str, Any]) -> xr.Dataset:
     """Record of rows (n, width) in the layout of measured tests, as long as one session lasts.
 
+    `spool_command` acts from its sample to the next; where the plant holds by itself it is the last that was sent.
     A sample that the controller missed repeats the row before it; `answered` is 0 there. attrs: further attributes.
     Raises RecordError for fewer than two samples.
     """
@@ -61,8 +62,8 @@ def record_of_rows(rows: Array, layout: Rows, machine: Machine, attrs: Mapping[s
     again = np.flatnonzero(np.diff(sample) < 0)  # a session that began anew counts from zero
     if len(again):
         rows, sample = rows[: again[0] + 1], sample[: again[0] + 1]
-    sample, first = np.unique(sample, return_index=True)  # before the first command a sample is read again and again
-    rows = rows[first]
+    last = np.append(np.diff(sample) > 0, True)  # the first command answers a sample that was read without one before
+    rows, sample = rows[last], sample[last]
     if len(rows) < 2:
         raise RecordError("nothing was recorded: the table did not move; set the pressure high first")
     every = np.arange(sample[0], sample[-1] + 1)
@@ -75,7 +76,9 @@ def record_of_rows(rows: Array, layout: Rows, machine: Machine, attrs: Mapping[s
     labels = machine.labels
     if np.isfinite(layout.of(rows, "supply_pressure")).all():
         double = [name in machine.double_acting for name in machine.actuator_names]
-        channels |= {name: layout.of(rows, name) for name in ("chamber_pressure_a", "spool_position")}
+        channels["chamber_pressure_a"] = layout.of(rows, "chamber_pressure_a")
+        spool = layout.of(rows, "spool_position")  # a reading has its mean over the sample before, a record that after
+        channels["spool_position"] = np.concatenate([spool[1:], spool[-1:]])
         channels["supply_pressure"] = layout.of(rows, "supply_pressure")[:, 0]
         if any(double):
             channels["chamber_pressure_b"] = layout.of(rows, "chamber_pressure_b")[:, double]

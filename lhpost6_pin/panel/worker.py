@@ -31,7 +31,7 @@ __all__ = ["Setup", "control", "panel_numbers", "rows_of", "serve_plant"]
 
 _IDLE = 0.1  # [s] between looks at orders
 _SILENCE = 1.0  # [s] without sensors until the link is lost
-_PATIENCE = 0.2  # [s] that the clock of a plant of its own waits for a command
+_PATIENCE = 1.0  # [s] that a plant of its own waits for a command before its controller counts as dead
 _OFTEN, _SELDOM = 64, 4  # samples between looks at orders, and such looks between those at what is to be shown
 _KEEP = 2048  # samples between signs of life to a server that is not commanded
 _MOST_UNANSWERED = 4  # samples that are answered, of those that came meanwhile; older ones are missed
@@ -148,8 +148,10 @@ class _Controller:
         command = engine.answer(self._reading)
         if command is not None:
             client.send(command)
-        elif engine.pressure == "high" and self._reading.sample - self._kept > _KEEP:
-            client.keep()
+        elif self._reading.state == PlantState.RUNNING or (
+            engine.pressure == "high" and self._reading.sample - self._kept > _KEEP
+        ):
+            client.keep()  # a plant of the panel's own waits for commands until it knows that none come
             self._kept = self._reading.sample
         self._ring.write(engine.row)
 
@@ -195,8 +197,9 @@ class _Controller:
             return
         if self._engine is None:
             raise SimulationError("the pressure is off; set it low, then high")
+        before = self._engine.commanding
         self._engine.order(order, _program_of(order))
-        if order["do"] in ("pressure", "reset") and self._client is not None:
+        if self._engine.commanding and not before and self._client is not None:
             self._answer(self._client, self._engine)  # a plant that waits for its first command sends nothing
 
     def _begin(self, host: str, port: int) -> None:

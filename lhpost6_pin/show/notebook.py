@@ -7,10 +7,15 @@ from typing import Any
 
 import xarray as xr
 
+from ..core.errors import LhpostError
+from ..core.files import shipped
 from ..discovery import Discovery
 from ..identification.calibration import Calibration
 from ..identification.decompose import Decomposed, find_agreement, find_work
 from ..identification.validation import Validation
+from ..machine.machine import Machine, load_machine
+from ..machine.recorded_changes import changes_summary
+from ..mechanics.plant import make_plant
 from ..simulation.rehearse import SimulatedTest
 from ..tuning.iterate import Iterated
 from ..tuning.sine import SineTest
@@ -36,7 +41,8 @@ SUMMARY_HEIGHT = 420  # of a summary [CSS px]
 def show_report(result: Any) -> Picture:
     """Return the report of a record, or of the result of a run, a tuning or an analysis.
 
-    Its `save` writes it to one HTML file. Raises TypeError for anything else, and what the report of its kind raises.
+    A record is judged by the shipped machine that it names. `save` of the report writes one HTML file. Raises TypeError
+    for anything else, and what the report of its kind raises.
     """
     return Picture(_page(result), HEIGHT)
 
@@ -60,7 +66,23 @@ def _write(result: Any, path: Path) -> Any:
 
 @_write.register
 def _(result: xr.Dataset, path: Path) -> Any:
-    return write_run_report(result, path)
+    machine = _recorded_machine(result)
+    if machine is None:
+        return write_run_report(result, path)
+    shown = f"Limits are those of the shipped {machine.name}; the record was"
+    notes = [f"{shown} {change}." for change in changes_summary(result.attrs)]
+    return write_test_report(make_plant(machine), result, path, notes)
+
+
+def _recorded_machine(record: xr.Dataset) -> Machine | None:
+    """The shipped machine that a record names, with the specimen and valves that it states; None if there is none."""
+    name = str(record.attrs.get("machine", "")).lower()
+    if name not in shipped():
+        return None
+    try:
+        return load_machine(name).as_tested(record.attrs, "the record")
+    except LhpostError:  # its specimen is not here
+        return None
 
 
 @_write.register

@@ -58,15 +58,18 @@ def machine_entries(machine: Machine) -> Entries:
 
 
 def capacity_entries(found: "MachineCapacity") -> Entries:
-    """Capacity with what is mounted, limits by axis, and the oil-column modes of the bare table."""
+    """Capacity with what is mounted, limits by axis, and oil-column modes: of the bare table, and with a specimen."""
     from ..mechanics.linearize import oil_column_modes
     from . import capacity_tables
 
     machine = found.machine
+    loaded = [oil_column_modes(machine, undamped=u, loaded=True) if machine.specimen else () for u in (True, False)]
     return {
         **capacity_tables.capacity_entries(found),
         "modes": oil_column_modes(machine),
         "modes_with_friction_and_leaks": oil_column_modes(machine, undamped=False),
+        "loaded_modes": loaded[0],
+        "loaded_modes_with_friction_and_leaks": loaded[1],
     }
 
 

@@ -90,14 +90,25 @@ def _inertia_table(machine: Machine) -> Table:
 
 
 def print_modes(machine: Machine) -> None:
-    """Print the oil-column modes of the linearised plant, without and with friction and leakage."""
+    """Print the oil-column modes of the linearised plant, without and with friction and leakage.
+
+    Of a table with a specimen those of the bare one, and those with the specimen as one rigid body.
+    """
+    if machine.specimen is None:
+        print_blocks(_modes(machine, "Oil-column modes", loaded=False))
+        return
+    rigid = f"Oil-column modes with {machine.specimen.name} as one rigid body"
+    bare = "Oil-column modes of the bare table"
+    print_blocks(_modes(machine, rigid, loaded=True), _modes(machine, bare, loaded=False))
+
+
+def _modes(machine: Machine, title: str, *, loaded: bool) -> Table:
     from ..mechanics.linearize import oil_column_modes
 
-    full = {m.axis: (f"{m.frequency:.2f}", f"{100 * m.damping:.2f}") for m in oil_column_modes(machine, undamped=False)}
-    rows = [(m.axis, f"{m.frequency:.2f}", *full.get(m.axis, ("", ""))) for m in oil_column_modes(machine)]
-    header = ("axis", "undamped [Hz]", "with sticking friction and leakage [Hz]", "damping [%]")
-    bare = " of the bare table" if machine.specimen else ""
-    print_blocks(Table(f"Oil-column modes{bare}", header, rows))
+    damped, free = (oil_column_modes(machine, undamped=u, loaded=loaded) for u in (False, True))
+    full = {m.axis: (f"{m.frequency:.2f}", f"{100 * m.damping:.2f}") for m in damped}
+    rows = [(m.axis, f"{m.frequency:.2f}", *full.get(m.axis, ("", ""))) for m in free]
+    return Table(title, ("axis", "undamped [Hz]", "with sticking friction and leakage [Hz]", "damping [%]"), rows)
 
 
 def print_motions(name: str | None = None) -> None:

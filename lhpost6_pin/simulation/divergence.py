@@ -4,6 +4,7 @@ One step of dt multiplies a mode with rate s by R(z), z = s dt: 1 + z with Euler
 Runge-Kutta 4; it grows at ln|R| / dt. The modes are those of the plant linearised at rest, valves at rest.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from ..mechanics.equilibrium import find_equilibrium
 from ..mechanics.linearize import linearize
 from ..mechanics.plant import Plant
 
-__all__ = ["amplified_mode", "scheme_divergence"]
+__all__ = ["amplified_mode", "recorded_divergence", "scheme_divergence"]
 
 
 def amplified_mode(plant: Plant, scheme: str, rate: int) -> tuple[float, float]:
@@ -41,6 +42,12 @@ def scheme_divergence(plant: Plant, scheme: str, rate: int, time: float) -> str:
         f"diverged before {time:.4f} s: scheme {scheme} at {rate} steps a second amplifies a mode of the table at "
         f"{frequency:.3g} Hz, which is damped, by {growth:.3g} 1/s; take semi_implicit, or more steps (--rate)"
     )
+
+
+def recorded_divergence(attrs: Mapping[str, Any]) -> str:
+    """Why the run of a record diverged by its scheme, from the record's attributes; empty if it did not."""
+    trouble = str(attrs.get("trouble", "none"))
+    return trouble if trouble.startswith("diverged ") else ""
 
 
 def _factor(z: Any, scheme: str) -> Complex:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core.arrays import Array
 
-__all__ = ["OilUse", "oil_use"]
+__all__ = ["Bank", "OilUse", "oil_use"]
 
 
 class OilUse(NamedTuple):
@@ -16,6 +16,34 @@ class OilUse(NamedTuple):
     mean: float  # [m3/s]
     volume: float  # drawn in all [m3]
     from_accumulators: float  # largest volume that pumps had not replaced; not-a-number without their flow [m3]
+
+
+class Bank(NamedTuple):
+    """Accumulators: their volume, and the pressures of their gas: without oil, charged, and the lowest allowed.
+
+    Charged slowly, at constant temperature, the gas fills V_1 = V_0 P_0 / P_1. A test then expands it by a polytropic
+    law with index n, P V^n constant (n = 1.4: without heat exchange).
+    """
+
+    volume: float  # V_0 [m3]
+    precharge: float  # P_0 [Pa]
+    charged: float  # P_1 [Pa]
+    lowest: float  # P_2 [Pa]
+    gas_index: float  # n [1]
+
+    @property
+    def gas(self) -> float:
+        """Volume of the charged gas [m3]."""
+        return self.volume * self.precharge / self.charged
+
+    @property
+    def usable(self) -> float:
+        """Oil that they give until the lowest pressure [m3]: V_1 ((P_1 / P_2)^(1/n) - 1)."""
+        return self.gas * ((self.charged / self.lowest) ** (1.0 / self.gas_index) - 1.0)
+
+    def pressure_after(self, drawn: float) -> float:
+        """Pressure [Pa] once a volume of oil is drawn [m3]."""
+        return self.charged * (1.0 + drawn / self.gas) ** -self.gas_index
 
 
 def oil_use(flow: Array, step: float, pump_flow: float = np.nan) -> OilUse:

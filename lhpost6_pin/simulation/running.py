@@ -197,7 +197,7 @@ class RunningPlant:
             raise SimulationError(f"a command is {self.plant.spools} finite spool values; got {command}")
         self.clipped += int(np.count_nonzero(np.abs(command) > 1.0))
         self._history[:-1] = self._history[1:]
-        self._history[-1] = np.clip(command, -1.0, 1.0)
+        self._history[-1] = command.clip(-1.0, 1.0)
         if self.sample == 0:  # commands before the first one were equal to it
             self._history[:] = self._window[:] = self._history[-1]
         first = self.sample - len(self._history) + 1

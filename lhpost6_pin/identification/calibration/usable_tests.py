@@ -13,7 +13,7 @@ import xarray as xr
 from ...core.errors import RecordError
 from ...data.campaign import Campaign, SkippedTest
 from ...data.channels import calibrated_channels, columns_of
-from ...data.conditioning import resolution
+from ...data.conditioning import resolutions
 from ...data.records import is_measured
 from .result import calibration_numbers
 from .whitened_residuals import spectrum_of
@@ -80,5 +80,5 @@ def _alive(record: xr.Dataset, name: str) -> bool:
     """Whether a channel moves by far more than its resolution."""
     if name not in record:
         return False
-    values = columns_of(record[name])
-    return bool(np.ptp(values, axis=0).max() > _ALIVE * resolution(values) > 0.0)
+    moved, steps = np.ptp(columns_of(record[name]), axis=0), resolutions(record[name])
+    return bool(moved.max() > _ALIVE * steps.max() > 0.0)

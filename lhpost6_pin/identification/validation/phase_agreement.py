@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core.arrays import Array, Mask
 from ...data.channels import LAYOUT, channel_unit
-from ...data.signals import align, correlation, delay, drift_rate, peak_ratio, rrmse
+from ...data.signals import align, correlation, delay_within, drift_rate, peak_ratio, rrmse
 from .prepare_tests import Numbers
 
 __all__ = ["MOTIONS", "ColumnAgreement", "ComparedQuantity", "agree", "unit_of"]
@@ -90,7 +90,8 @@ def agree(pairs: Sequence[ComparedQuantity], dt: float, numbers: Numbers) -> tup
             if moves[k]:
                 late = shared.get(column, late) if pair.quantity in MOTIONS else late
                 if np.isnan(late):
-                    late = float(delay(pair.measured[part, k], pair.model[part, k], dt, numbers.longest_delay))
+                    sides = pair.measured[part, k], pair.model[part, k]
+                    late = float(delay_within(*sides, dt, numbers.longest_delay))
             if pair.quantity == "velocity":
                 shared[column] = late
             found.append(_agree_one(pair, k, bool(moves[k]), late, part, dt))

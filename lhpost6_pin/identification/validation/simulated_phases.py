@@ -8,7 +8,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import SimulationError
 from ...core.names import AXES
-from ...data.signals import Band, delay, resample_band_limited
+from ...data.signals import Band, delay_within, resample_band_limited
 from ...mechanics.pose import PlatenMotion
 from ...simulation.rehearse import SimulatedTest
 from ..prepare import actuator_forces
@@ -89,7 +89,7 @@ class SimulatedComparison:
             if column in moving:
                 sides = velocity.measured[:, k], velocity.model[:, k]
                 reference = wanted[:, AXES.index(column)]
-                found.append(Lag(column, *(float(delay(reference, x, self.dt, longest)) for x in sides)))
+                found.append(Lag(column, *(float(delay_within(reference, x, self.dt, longest)) for x in sides)))
         return tuple(found)
 
     def spectrum(self) -> Spectrum:

@@ -135,7 +135,10 @@ class LinkClient:
         return found
 
     def keep(self) -> None:
-        """Keep the plant without commanding it: a server frees one whose client is silent for ten seconds."""
+        """Keep the plant without commanding it: a server frees one whose client is silent for ten seconds.
+
+        One that waits for commands (`serve` with patience) waits no longer, and goes to its safe hold.
+        """
         self._put(Datagram(Kind.HELLO, self._session))
 
     def exchange(self, command: Array, wrench: ArrayLike | None = None) -> Reading:
@@ -271,12 +274,13 @@ class LinkClient:
 
     def _read(self, frame: Datagram) -> Reading:
         assert frame.numbers is not None
-        n, k = len(self.actuators), frame.struts
+        numbers, n, at = frame.numbers, len(self.actuators), 6 + 2 * len(self.actuators)
+        sensors = Feedback(numbers[6 : 6 + n], numbers[:6], numbers[6 + n : at])
+        motion = motion_of_numbers(numbers[at : at + MOTION])
         pressures = None
         if frame.pressures:
-            a, b, spool, strut, supply = np.split(frame.numbers[-3 * n - k - 1 :], np.cumsum([n, n, n, k]))
-            pressures = PressureReading(a, b, spool, strut, float(supply[0]))
-        at = 6 + 2 * n
-        sensors = Feedback(frame.numbers[6 : 6 + n], frame.numbers[:6], frame.numbers[6 + n : at])
-        motion = motion_of_numbers(frame.numbers[at : at + MOTION])
+            own = numbers[at + MOTION :]
+            pressures = PressureReading(
+                own[:n], own[n : 2 * n], own[2 * n : 3 * n], own[3 * n : 3 * n + frame.struts], float(own[-1])
+            )
         return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, motion, pressures)

@@ -15,6 +15,7 @@ would need a plant for each pair, so one at a time is on.
 
 import logging
 from collections.abc import Hashable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -116,6 +117,7 @@ class ServedPlant:
         self.fault = self._acting = ""
         self._newest = self._acted = self._acted_stamp = self._newest_stamp = self._missed = 0
         self._fresh, self._asked = False, self._rest.spool
+        self._answers, self._commanding = 0, False  # sample that the newest command answers; whether more will come
         self.spool, self._from = self._rest.spool, self._rest.spool
         self._ramp = self._on_ramp = RAMP  # samples of the ramp, and those done
         self._answer = b""
@@ -133,11 +135,12 @@ class ServedPlant:
 
     @property
     def awaited(self) -> bool:
-        """Whether no new command has come for two samples, but had for the one before them.
+        """Whether the command that answers the newest sensors has yet to come, of a client that commands the plant.
 
-        An answer may thus take two samples, as in real time, and nothing waits for a client that stopped commanding.
+        A client ceases to command it by a hello of the same session, or by a sample that passes without a command.
         """
-        return self.state == PlantState.RUNNING and not self._fresh and self._missed == 1
+        answered = self._fresh and self._answers == self.sample
+        return self._taken and self.state == PlantState.RUNNING and self._commanding and not answered
 
     def receive(self, datagram: bytes, sender: Hashable, now: int) -> list[bytes]:
         """Take a datagram; returns what to send back to its sender. Never raises."""
@@ -181,7 +184,7 @@ class ServedPlant:
             self._missed, self._fresh = 0, False
             self._resume()
         else:
-            self._missed += 1
+            self._missed, self._commanding = self._missed + 1, False
             self.counts["missed_frames"] += 1
             if self._missed == MISSED_FRAMES:
                 self._hold()
@@ -202,7 +205,7 @@ class ServedPlant:
                 self._move(now)
 
     def _hello(self, frame: Datagram, sender: Hashable, now: int) -> list[bytes]:
-        self._heard = now
+        self._heard, self._commanding = now, False
         if not self._taken or frame.session != self._session:
             self._pressures = frame.pressures
             self._begin()
@@ -223,8 +226,9 @@ class ServedPlant:
         self.counts["lost"] += (frame.sequence - self._newest - 1) % (1 << 32)
         self.counts["superseded"] += self._fresh
         self._newest, self._newest_stamp = frame.sequence, frame.stamp
+        self._answers, self._commanding = frame.acknowledged, True
         values = frame.numbers[: self._width]
-        self._asked = np.clip(per_actuator(values, self._valves, self._curves), -1.0, 1.0)
+        self._asked = per_actuator(values, self._valves, self._curves).clip(-1.0, 1.0)
         self._wrench = frame.wrench if frame.wrench is not None else self._wrench
         if frame.echo:
             self.answer_time.add(now - frame.echo)
@@ -301,5 +305,8 @@ class ServedPlant:
         """Sensors, motion of the interface and, if asked for, pressures in the order of their frame."""
         table = self._table
         sensors, motion = table.sensors(), motion_numbers(table.interface_motion())
-        pressures = table.pressures() if self._pressures else ()
-        return np.hstack([sensors.acceleration, sensors.displacement, sensors.force, motion, *pressures])
+        parts: tuple[Any, ...] = sensors.acceleration, sensors.displacement, sensors.force, motion
+        if self._pressures:
+            *pressures, supply = table.pressures()
+            parts += (*pressures, (supply,))
+        return np.concatenate(parts)

@@ -59,10 +59,12 @@ def serve(
     """Answer datagrams and move the plant until `stop` is set, Ctrl-C is pressed or `seconds` are over.
 
     Real time: sample k of a run is due k/2048 s after its first command came, whatever became of those before; `pace`
-    is a factor on the speed of that clock, below one for a computer that is too slow. With `patience` [s] it waits that
-    long for a command that is late by two samples, and catches up with at most 0.1 s afterwards: what a computer does
-    meanwhile, or is too slow for, then delays the plant, and does not bring it to its safe hold. The counts are
-    in `served.counts`. Raises LinkError for a time that is negative or not finite, or a pace that is not positive.
+    is a factor on the speed of that clock, below one for a computer that is too slow. With `patience` [s] every sample
+    waits for the command that answers the sensors before it, up to that long, and the clock catches up with at most
+    0.1 s afterwards: the run is that of lock-step on any computer, which delays it where it is too slow. The plant goes
+    to its safe hold where a client is silent for longer, or states by `LinkClient.keep` that it does not command. The
+    counts are in `served.counts`. Raises LinkError for a time that is negative or not finite, or a pace that is not
+    positive.
     """
     if not 0.0 < pace < math.inf:
         raise LinkError(f"a pace of {pace:g}; give a number above zero, 1 for real time")
@@ -86,8 +88,8 @@ def serve(
                     continue
                 due = begin + round(sample * SECOND / (SAMPLE_RATE * pace))
                 _listen_until(sock, served, due)
-                if patience and served.awaited:
-                    _await(sock, served, patience)
+                if patience:
+                    _await(sock, served, patience, stop)
                     begin += max(0, now() - due - round(_BEHIND * SECOND))
                 started = now()
                 _tick(sock, served)
@@ -116,11 +118,11 @@ def _listen_until(sock: socket.socket, served: ServedPlant, due: int) -> None:
             break
 
 
-def _await(sock: socket.socket, served: ServedPlant, seconds: float) -> None:
-    """Receive until an awaited command has come, or a time [s] is over."""
+def _await(sock: socket.socket, served: ServedPlant, seconds: float, stop: threading.Event) -> None:
+    """Receive until an awaited command has come, a time [s] is over, or `stop` is set."""
     end = now() + round(seconds * SECOND)
-    while served.awaited and (left := end - now()) > 0:
-        _listen(sock, served, left / SECOND)
+    while served.awaited and (left := end - now()) > 0 and not stop.is_set():
+        _listen(sock, served, min(left / SECOND, _IDLE))
 
 
 def _listen(sock: socket.socket, served: ServedPlant, timeout: float) -> bool:

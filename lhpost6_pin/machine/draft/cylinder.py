@@ -25,10 +25,10 @@ def cylinder_areas(basis: Basis, cylinder: str) -> tuple[Quantity, Quantity]:
         if rod is not None and rod >= bore:
             raise ParameterError("--rod: the rod is not thinner than --bore")
         stated = "; ".join(known[key].source for key in ("bore", "rod") if key in known and (double or key == "bore"))
-        area = Quantity(bore - (rod or 0.0) if double else bore, "m2", "derived", stated)
+        how = "section of the bore less the rod's" if double else "section of the bore"
+        area = Quantity(bore - (rod or 0.0) if double else bore, "m2", "derived", f"{how}; {stated}")
     if double:
-        area = replace(area, source=f"double-rod cylinder, equal areas; {area.source}")
-        return area, area
+        return area, replace(area, evidence="derived", source=f"double-rod cylinder: as area A; {area.source}")
     if rod is None:
         rule, value = basis.typical["cylinder.rod_share"], first(area.value)
         share, sd = basis.rule("cylinder.rod_share"), value * first(rule.sd)

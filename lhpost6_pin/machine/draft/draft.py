@@ -101,10 +101,11 @@ def _oil(basis: Basis) -> dict[str, Quantity]:
     """Supply and oil."""
     drop = basis.known_or("rated_drop", "valve.rated_drop")
     why = f"half of {first(drop.value) / 1e6:g} MPa, across one path of the valve; {drop.source}"
+    evidence = "derived" if "rated_drop" in basis.known else "assumed"
     return {
         "supply_pressure": basis.known["supply_pressure"],
         "return_pressure": basis.known_or("return_pressure", "oil.return_pressure"),
-        "rated_pressure": Quantity(0.5 * first(drop.value), "Pa", "derived", why),
+        "rated_pressure": Quantity(0.5 * first(drop.value), "Pa", evidence, why),
         "bulk_modulus": basis.with_sd(basis.known_or("bulk_modulus", "oil.bulk_modulus"), 0.0),
         "root_regularisation": basis.typical["oil.root_regularisation"],
     }

@@ -56,11 +56,13 @@ def _count(number: int, name: str) -> str:
 def _headlines(found: EnsembleSummary, scale: int, failed: int) -> list[Headline]:
     whole: Level = "bad" if failed else "attention" if found.stopped else "good"
     headlines = [Headline(f"{found.runs - failed - found.stopped}", "whole runs", f"of {found.runs}", whole)]
-    for own in found.configurations[:1]:
-        one = own.exceedances[0]
+    if found.configurations:
+        own = max(found.configurations, key=lambda own: np.nan_to_num(own.exceedances[0].share[scale]))
+        one, count = own.exceedances[0], len(found.configurations)
         level: Level = "good" if not one.share[scale] > found.level else "attention"
         ends = " to ".join(percent(float(end[scale])) for end in (one.low, one.high))
-        note = f"{ends}; {own.motion}, specimen {own.specimen}, controller {own.controller}"
+        of = f", the worst of {count} configurations" if count > 1 else ""
+        note = f"{ends}; {own.motion}, specimen {own.specimen}, controller {own.controller}{of}"
         label = f"probability of reaching any limit at scale {found.scales[scale]:g}"
         headlines.append(Headline(percent(float(one.share[scale])), label, note, level))
     at = [s for s in found.shown_spreads if s.result == TRACKED]

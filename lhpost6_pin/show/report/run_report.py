@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ...data.metrics import QUANTITIES, SpoolUse, Tracking, commanded_axes, sampling, spool_use, track
 from ...data.motion_measures import MotionMeasures, motion_measures
 from ...motions import Peak
+from ...simulation.divergence import recorded_divergence
 from ...simulation.limit_use import (
     TOLERANCE,
     LimitUse,
@@ -103,6 +104,9 @@ def write_run_report(
     summary = RunSummary(None if path is None else Path(path), verdict, level, *lists)
     if summary.path is None:
         return summary
+    if why := recorded_divergence(record.attrs):
+        save_page(_page(record, summary, _diverged(record, why, machine_table), notes, command), summary.path)
+        return summary
     paper = performance_blocks(loads, motion_peaks(record), fits, source="the target") if loads else []
     motion = [f"platen_{quantity}" for quantity in QUANTITIES]
     response = response_blocks(record)
@@ -133,19 +137,34 @@ def write_run_report(
         Section("assumptions", "Assumptions and sources", machine_blocks(list(machine_table or ()))),
         Section("record", "The record", _contents(record)),
     ]
-    page = Page(
+    save_page(_page(record, summary, sections, notes, command), summary.path)
+    return summary
+
+
+def _page(
+    record: xr.Dataset, summary: RunSummary, sections: Sequence[Section], notes: Sequence[str], command: str | None
+) -> Page:
+    return Page(
         kind=f"Run report · {record.attrs.get('kind', 'test')}",
         title=str(record.attrs.get("title") or record.attrs.get("test") or "Test on the shake table"),
-        purpose=_purpose(record, found),
-        verdict=verdict,
-        level=level,
-        headlines=summary.headlines,
+        purpose=_purpose(record, summary.tracking),
+        verdict=summary.verdict,
+        level=summary.level,
+        headlines=() if recorded_divergence(record.attrs) else summary.headlines,
         sections=sections,
         notes=notes,
         command=command,
     )
-    save_page(page, summary.path)
-    return summary
+
+
+def _diverged(record: xr.Dataset, why: str, rows: Iterable[Sequence[Any]] | None) -> list[Section]:
+    """Sections of a run that its scheme made diverge: no number that it computed is among them."""
+    words = f"The run {why}. Its numbers are the scheme's, not the table's: none is shown, and all are in the record."
+    return [
+        Section("tracking", "Why there are no results", [words]),
+        Section("assumptions", "Assumptions and sources", machine_blocks(list(rows or ()))),
+        Section("record", "The record", _contents(record)),
+    ]
 
 
 def _gaps(record: xr.Dataset) -> list[str]:

@@ -7,7 +7,7 @@ import xarray as xr
 
 from ...core.arrays import Array, Mask
 from ...data.metrics import SpoolUse, channel, kinds, labels, peak_window, peaks, sampling
-from ...data.signals import delay
+from ...data.signals import delay_within
 from .page import Block, Figure, Table, bar, details, grid, missing
 from .plots import ACHIEVED, ROW, TARGET, VERMILLION, Row, Trace, time_figure
 from .scales import SCALES, milliseconds, percent
@@ -97,7 +97,7 @@ def _close_up(actuators: Sequence[str], k: int, traces: Sequence[Trace], start: 
     words = "Around its largest command, every sample."
     near = [trace.values[slice(*window)] for trace in traces]
     if len(near) == 2 and np.isfinite(near).all():
-        late = float(delay(near[0], near[1], step, LONGEST_DELAY))
+        late = float(delay_within(near[0], near[1], step, LONGEST_DELAY))
         words += f" The position is {milliseconds(late)} late." if np.isfinite(late) else ""
     rows = [Row("Fraction of the stroke", traces, SCALES["ratio"])]
     title = f"Spool {actuators[k]}, close-up"

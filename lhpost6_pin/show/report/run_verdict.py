@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ...data.metrics import SpoolUse, Tracking, channel, labels
+from ...simulation.divergence import recorded_divergence
 from ...simulation.limit_use import TOLERANCE, LimitUse, governing_limits
 from .page import Headline, Level, number
 from .run_limits import only_spools
@@ -29,6 +30,7 @@ def verdict_of_run(
     stopped = str(record.attrs.get("trouble", "none")).partition(";")[0]
     clipped, loop, unstable = _clipped(record, spools), *_loop(record)
     if stopped != "none":  # the part before the stop does not represent the test
+        clipped = "" if recorded_divergence(record.attrs) else clipped
         sentences = [f"The run {stopped}: tracking is not judged.", clipped, loop, "See the notes."]
         return " ".join(filter(None, sentences)), "bad"
     tracked, level = _followed(record, found, clipped=bool(clipped))

@@ -1,8 +1,6 @@
 """The application: commands by job, the entry point, errors without a traceback, output and progress."""
 
-import atexit
 import errno
-import gc
 import inspect
 import logging
 import os
@@ -21,6 +19,7 @@ from typer.core import TyperGroup
 
 from .. import __version__
 from ..core.errors import LhpostError, OutOfRangeError
+from ..core.garbage import collect_less
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -123,7 +122,7 @@ def main() -> None:
     """Entry point; errors that the user can correct are printed without a traceback."""
     from rich.logging import RichHandler
 
-    _collect_less()
+    collect_less()
     handler = RichHandler(console=stderr(), show_path=False, show_time=False)
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])
     with _noting_ctrl_c():
@@ -135,16 +134,6 @@ def main() -> None:
                 raise
             stderr().print("interrupted; no incomplete file is left")
             sys.exit(_INTERRUPTED)
-
-
-def _collect_less() -> None:
-    """Search for cyclic garbage less often, and not when the process ends, whose memory is returned as a whole.
-
-    Libraries make some 250,000 objects that live as long as the process. By its own thresholds the interpreter
-    searches all of them several times while it loads them, and once more before it exits.
-    """
-    gc.set_threshold(_OBJECTS, *gc.get_threshold()[1:])
-    atexit.register(gc.freeze)
 
 
 def run_script(function: Callable[..., Any]) -> None:
@@ -193,9 +182,6 @@ _REMEDIES = dict.fromkeys(
     (errno.ENOSPC, errno.EDQUOT, errno.EFBIG), "; make room, or choose another folder with --out"
 ) | {errno.EROFS: "; choose another folder with --out"}
 """Remedies by error number."""
-
-_OBJECTS = 10_000
-"""New containers after which the interpreter looks for cyclic garbage; its own number is 700 to 2,000."""
 
 _PRESSED: list[int] = []
 """Signals received from Ctrl-C since the command began."""

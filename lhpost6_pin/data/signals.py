@@ -20,6 +20,7 @@ __all__ = [
     "delay",
     "differentiate",
     "drift_rate",
+    "fast_length",
     "lag",
     "lowpass_zero_phase",
     "peak_ratio",

@@ -179,7 +179,7 @@ def make_record(
 
 
 def _variable(dims: Any, values: ArrayLike, attrs: Mapping[str, Any] | None = None) -> xr.Variable:
-    """Variable of plain numbers, which xarray need not compare with the arrays of Dask, for which it would import it."""
+    """Variable of plain numbers, which xarray need not compare with the arrays of Dask, which it would import."""
     return xr.Variable(dims, np.asarray(values), attrs, fastpath=True)
 
 

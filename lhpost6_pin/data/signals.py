@@ -267,7 +267,7 @@ def _filtered(x: Array, dt: float, response: Callable[[Array], NDArray[Any]], ke
         fade = np.cos(0.5 * np.pi * np.arange(1, more + 1) / more) ** 2
         rest = np.concatenate([rest, -rest[-2 : -2 - more : -1] * fade.reshape(-1, *[1] * (x.ndim - 1))])
     odd = np.concatenate([rest, -rest[-2:0:-1]])
-    spectrum = np.fft.rfft(odd, axis=0) * response(np.fft.rfftfreq(len(odd), dt))
+    spectrum = np.fft.rfft(odd, axis=0) * response(np.asarray(np.fft.rfftfreq(len(odd), dt), np.float64))
     return np.fft.irfft(spectrum, len(odd), axis=0)[:n] + chord * keep_chord
 
 

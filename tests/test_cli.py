@@ -773,3 +773,14 @@ def test_a_run_without_a_record_may_stand_beside_the_record_that_it_runs(lhpost6
     assert lhpost6("run", "here/record.nc", "--scale", "0.5", "--no-record", "--out", "here").code == 0
     assert (tmp_path / "here" / "record.nc").read_bytes() == record
     assert refused(lhpost6("run", "here/record.nc", "--out", "here"), "would be replaced by its own results")
+
+
+def test_a_command_searches_for_garbage_less_often_and_not_at_its_end():
+    """Handlers run last first: this one sees what the process leaves to be searched."""
+    code = (
+        "import atexit, gc; atexit.register(lambda: print(len(gc.get_objects()), gc.get_threshold()[0])); "
+        "from lhpost6_pin.cli import main; import sys; sys.argv = ['lhpost6', '--version']; main()"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    left, threshold = map(int, ended.stdout.split()[-2:])
+    assert left < 1000 and threshold == 10_000  # the command itself leaves some 50,000 objects

@@ -22,7 +22,7 @@ from lhpost6_pin.mechanics.payload import lock_joints, with_payload
 from lhpost6_pin.mechanics.performance import table_performance
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.port_path import ports_along
-from lhpost6_pin.mechanics.pose import PlatenMotion, plant_motion
+from lhpost6_pin.mechanics.pose import PlatenMotion, leg_displacements, plant_motion
 from lhpost6_pin.mechanics.strokes import stroke_ends
 from lhpost6_pin.motions import find_motion, make_target, with_scale
 from lhpost6_pin.simulation.motion_limits import check_motion_limits, fitting_scale, judge_motion
@@ -73,6 +73,8 @@ def test_required_forces_balance_the_motion_in_the_report_s_equations():
         pose, np.array([[0.5, 0.3, 0.1, 0.01, 0.02, 0.03]]), np.array([[4.0, -3.0, 2.0, 0.3, 0.2, -0.1]])
     )
     found, span = required_forces(plant, motion), force_range(plant)
+    legs, _ = leg_displacements(plant, pose)
+    np.testing.assert_array_equal(required_forces(plant, motion, legs).share, found.share)
     force = span.middle + span.half * found.share[0]
     moved = plant_motion(plant, motion)
     place = platen_pose_at(pose[0])

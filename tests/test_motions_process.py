@@ -1,6 +1,7 @@
 """Targets: derivatives, resampling, rest at both ends, refusal of what does not fit; and response spectra."""
 
 import re
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -260,6 +261,33 @@ def test_a_demand_that_is_infinite_at_the_first_trial_does_not_hide_the_others()
 
     expected = 2.0 / np.abs(target.velocity[:, 0]).max()
     assert 0.989 * expected < largest_scale(target, limited(displacement=("x", 5.0)), check) <= expected * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("place", range(1000, 1008))
+def test_a_demand_of_a_single_sample_limits_the_scale_wherever_it_is(place):
+    """Closed form: the share (4 + x) s of one sample is full; the search looks at every eighth sample first."""
+    target = make_target(find_motion("sine", amplitude=0.5, period=2.0))
+    marked = target.displacement.copy()
+    marked[place, AXES.index("yaw")] = 1.0
+
+    def check(displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> list[Demand]:
+        return [Demand("lift", ("V1",), displacement[:, :1] + 4.0 * displacement[:, -1:], "")]
+
+    alone = 1.0 / (4.0 + marked[place, 0])
+    found = largest_scale(replace(target, displacement=marked), limited(displacement=("x", 5.0)), check)
+    assert 0.989 * alone < found <= alone * (1 + 1e-6)
+
+
+def test_the_largest_scale_takes_few_looks_at_all_samples():
+    target, looks = make_target(find_motion("ridgecrest-ccc")), []
+
+    def check(displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> list[Demand]:
+        looks.append(len(displacement))
+        return [Demand("actuator velocity", ("H1",), velocity[:, :1] / 0.5, "")]
+
+    fits = largest_scale(target, WIDE, check)
+    assert fits == pytest.approx(0.5 / np.abs(target.velocity[:, 0]).max(), rel=0.01)
+    assert sum(looks) < 1.5 * len(target.time)  # of few samples all looks but one
 
 
 def test_an_over_range_refusal_is_short_and_says_first_the_scale_then_axes_then_legs_by_quantity():

@@ -21,7 +21,7 @@ from lhpost6_pin.core.errors import RecordError, UnknownNameError
 from lhpost6_pin.data.metrics import QUANTITIES
 from lhpost6_pin.mechanics.specimen_modes import SpecimenMode
 from lhpost6_pin.show.report.interaction_section import interaction_blocks
-from lhpost6_pin.show.report.page import Page, Section, Table, bar, number, render_page, save_page, text
+from lhpost6_pin.show.report.page import Page, Section, Table, bar, number, packed_plotly, render_page, save_page, text
 from lhpost6_pin.show.report.plots import ACHIEVED, Row, Trace, envelope, time_figure
 from lhpost6_pin.show.report.run_report import RunSummary, lead_summary, write_run_report
 from lhpost6_pin.show.report.scales import SCALES, Scale, percent, scaled_number, shown_as
@@ -523,6 +523,16 @@ def test_the_page_loads_nothing_from_elsewhere(tmp_path):
     assert "default-src 'none'" in policy and "http" not in policy
     (packed,) = (script for script in reader.scripts if len(script) > 1_000_000)
     assert zlib.decompress(base64.b64decode(packed)).decode() == get_plotlyjs()
+
+
+@pytest.mark.parametrize("cached", [True, False], ids=["cache", "no cache"])
+def test_the_plotting_library_is_packed_once_where_there_is_a_cache(cached, tmp_path, monkeypatch):
+    monkeypatch.setattr("lhpost6_pin.core.compiled.cache_folder", lambda: tmp_path if cached else None)
+    pack = packed_plotly.__wrapped__
+    first = pack()
+    assert zlib.decompress(base64.b64decode(first)).decode() == get_plotlyjs()
+    monkeypatch.setattr("plotly.offline.get_plotlyjs", lambda: "not this one")
+    assert (pack() == first) == cached and len(list(tmp_path.iterdir())) == cached
 
 
 def test_headings_navigation_and_figures_can_be_reached_without_a_mouse(tmp_path):

@@ -14,6 +14,7 @@ from lhpost6_pin.data.signals import (
     delay_within,
     differentiate,
     drift_rate,
+    fast_length,
     lowpass_zero_phase,
     peak_ratio,
     resample_band_limited,
@@ -252,3 +253,10 @@ def test_integrals_are_those_of_a_sine(frequency: float, accuracy: float):
     )  # of ends, which a spline guesses
     np.testing.assert_allclose(np.diff(once[100:-100, 0]) * w, np.diff(-np.cos(w * T))[100:-100], atol=accuracy)
     assert twice[0, 0] == once[0, 0] == 0.0
+
+
+def test_fast_lengths_are_those_of_scipy():
+    from scipy.fft import next_fast_len
+
+    lengths = [*range(1, 3000), 102_401, 123_457, 999_983]
+    assert [fast_length(n) for n in lengths] == [next_fast_len(n, real=True) for n in lengths]

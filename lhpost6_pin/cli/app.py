@@ -19,6 +19,7 @@ from typer.core import TyperGroup
 
 from .. import __version__
 from ..core.errors import LhpostError, OutOfRangeError
+from ..core.garbage import collect_less
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -121,6 +122,7 @@ def main() -> None:
     """Entry point; errors that the user can correct are printed without a traceback."""
     from rich.logging import RichHandler
 
+    collect_less()
     handler = RichHandler(console=stderr(), show_path=False, show_time=False)
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])
     with _noting_ctrl_c():

@@ -117,6 +117,7 @@ def _jit(function: _F, **more: bool) -> _F:
     config.CACHE_DIR = "" if folder is None else str(folder)
     fastmath = {"contract", "nsz", "arcp"}
     options: Any = {"error_model": "numpy", "nogil": True, "fastmath": fastmath, **more}
+    options["no_cfunc_wrapper"] = True  # nothing calls compiled functions from C; each wrapper is compiled, too
     try:
         return cast(_F, numba.njit(cache=folder is not None, **options)(function))
     finally:

@@ -21,6 +21,7 @@ from ..core.files import write_whole
 from ..core.names import AXES
 from .channels import LAYOUT, LAYOUT_VERSION
 from .layout_faults import RecordFinding, is_number, layout_faults, sampling_rate
+from .netcdf import netcdf_content
 
 if TYPE_CHECKING:
     from ..machine.machine import Machine
@@ -124,12 +125,12 @@ def save_record(dataset: xr.Dataset, path: Path | str, *, single: bool = False) 
     _refuse(layout_faults(dataset), str(path))
     plain = dataset.drop_encoding()
     if single:
-        plain = plain.map(
-            lambda column: column.astype(np.float32) if column.dtype == float else column, keep_attrs=True
+        doubles = {name: column for name, column in plain.data_vars.items() if column.dtype == float}
+        plain = plain.assign(
+            {name: _variable(c.dims, c.values.astype(np.float32), c.attrs) for name, c in doubles.items()}
         )
-    encoding = {name: {"_FillValue": None} for name in plain.data_vars}
-    # through memory: HDF5 that meets a full disk crashes the process when it closes
-    with write_whole(path) as beside, memoryview(plain.to_netcdf(engine="h5netcdf", encoding=encoding)) as content:
+    content = netcdf_content(plain)
+    with write_whole(path) as beside:
         beside.write_bytes(content)
 
 
@@ -147,18 +148,19 @@ def make_record(
     `UnknownNameError` for a plain array under a name that the layout does not have.
     """
     time = np.asarray(time, dtype=float)
-    variables = {}
+    variables: dict[str, xr.Variable] = {}
     for name, values in channels.items():
         if isinstance(values, tuple):
-            variables[name] = values
+            variables[name] = _variable(*values)
         elif name not in LAYOUT:
             raise UnknownNameError("channel of the record layout", name, list(LAYOUT))
         else:
             channel, values = LAYOUT[name], np.asarray(values, dtype=float)
             if values.ndim != len(channel.dims):
                 raise RecordError(f"{name}: has shape {values.shape}; the layout has dimensions {channel.dims}")
-            variables[name] = (channel.dims, values, {"units": channel.units, "long_name": channel.long_name})
-    used = {dim for dims, *_ in variables.values() for dim in ([dims] if isinstance(dims, str) else dims)}
+            about = {"units": channel.units, "long_name": channel.long_name}
+            variables[name] = _variable(channel.dims, values, about)
+    used = {dim for variable in variables.values() for dim in variable.dims}
     # as indexes: to make them of arrays, xarray would import pint, which takes longer than all else here
     names = {
         dim: pd.Index(list(values), dtype=object)
@@ -174,6 +176,11 @@ def make_record(
     record.attrs |= dict(attrs) | {"layout_version": LAYOUT_VERSION}
     _refuse(layout_faults(record), "record")
     return record
+
+
+def _variable(dims: Any, values: ArrayLike, attrs: Mapping[str, Any] | None = None) -> xr.Variable:
+    """Variable of plain numbers, which xarray need not compare with the arrays of Dask, which it would import."""
+    return xr.Variable(dims, np.asarray(values), attrs, fastpath=True)
 
 
 def sample_interval(dataset: xr.Dataset) -> float:

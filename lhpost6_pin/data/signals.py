@@ -21,6 +21,7 @@ __all__ = [
     "delay_within",
     "differentiate",
     "drift_rate",
+    "fast_length",
     "lag",
     "lowpass_zero_phase",
     "peak_ratio",
@@ -86,8 +87,6 @@ def delay_within(reference: ArrayLike, signal: ArrayLike, dt: float, max_delay: 
 
 def _delay_samples(ref: Array, sig: Array, margin: int) -> float:
     """Delay of one signal in samples, at most `margin` either way."""
-    from scipy import fft
-
     n = len(ref)
     w = np.zeros(n)
     w[margin : n - margin] = np.hanning(n - 2 * margin + 2)[1:-1]
@@ -95,23 +94,20 @@ def _delay_samples(ref: Array, sig: Array, margin: int) -> float:
     ref, sig = ref - w @ ref, sig - w @ sig
     if not (np.any(w * ref) and np.any(w * sig)):
         return float("nan")
-    size = fft.next_fast_len(n + 2 * margin, real=True)
+    size = fast_length(n + 2 * margin)
     omega = 2 * np.pi * np.arange(size // 2 + 1) / size
     # spectra over lag τ of the windowed covariance, mean square and mean: sums of w r s, w s², w s at t + τ
-    spectra = np.conj(fft.rfft([w * ref, w, w], size)) * fft.rfft([sig, sig**2, sig], size) / size
-    cov, square, mean = size * np.roll(fft.irfft(spectra, size), margin, axis=1)[:, : 2 * margin + 1]
+    spectra = np.conj(np.fft.rfft([w * ref, w], size))[[0, 1, 1]] * np.fft.rfft([sig, sig**2, sig], size) / size
+    cov, square, mean = size * np.roll(np.fft.irfft(spectra, size), margin, axis=1)[:, : 2 * margin + 1]
     variance = square - mean**2
     if not variance.max() > 0:
         return float("nan")
     tau = whole = float(np.argmax(cov / np.sqrt(np.maximum(variance, 1e-12 * variance.max())))) - margin
     spectra[:, 1 : (size + 1) // 2] *= 2.0  # for the negative frequencies
     for _ in range(20):
-        term = spectra * np.exp(1j * omega * tau)
-        (c, s, m), (c1, s1, m1), (c2, s2, m2) = (
-            term.real.sum(axis=1),
-            -(term.imag @ omega),
-            -(term.real @ omega**2),
-        )
+        turn = np.exp(1j * omega * tau)
+        sums = spectra @ np.stack([turn, 1j * omega * turn, -(omega**2) * turn], axis=1)  # with derivatives by tau
+        (c, s, m), (c1, s1, m1), (c2, s2, m2) = sums.real.T
         v, v1, v2 = s - m**2, s1 - 2 * m * m1, s2 - 2 * (m1**2 + m * m2)
         if not (c > 0 and v > 0):  # nothing but rounding varies
             break
@@ -246,6 +242,21 @@ def resample_band_limited(x: ArrayLike, t_old: ArrayLike, t_new: ArrayLike, half
 
 
 # ---------------------------------------------------------------------------------------------- helpers
+def fast_length(n: int) -> int:
+    """Least length of at least `n` without prime factors beyond 5, at which Fourier transforms are fast.
+
+    As `scipy.fft.next_fast_len`, whose import takes longer than all transforms of a report.
+    """
+    best, fives = 1 << (n - 1).bit_length(), 1
+    while fives < best:
+        odd = fives
+        while odd < best:
+            best = min(best, odd << (-(-n // odd) - 1).bit_length())
+            odd *= 3
+        fives *= 5
+    return best
+
+
 def _filtered(x: Array, dt: float, response: Callable[[Array], NDArray[Any]], keep_chord: bool = True) -> Array:
     """Apply a frequency response to x less its chord, continued by odd reflection; put the chord back.
 
@@ -253,20 +264,18 @@ def _filtered(x: Array, dt: float, response: Callable[[Array], NDArray[Any]], ke
     periodic, continuous and with continuous slope: no wrap-around jump. Where twice the length has large prime
     factors, some more of the reflection, fading out, goes in between.
     """
-    from scipy import fft
-
     n = len(x)
     chord = np.linspace(x[0], x[-1], n)
     rest = x - chord
-    more = fft.next_fast_len(n - 1, real=True) - (n - 1)
+    more = fast_length(n - 1) - (n - 1)
     if more:
-        more = fft.next_fast_len(n - 1 + FADE, real=True) - (n - 1)
+        more = fast_length(n - 1 + FADE) - (n - 1)
     if 0 < more < n:
         fade = np.cos(0.5 * np.pi * np.arange(1, more + 1) / more) ** 2
         rest = np.concatenate([rest, -rest[-2 : -2 - more : -1] * fade.reshape(-1, *[1] * (x.ndim - 1))])
     odd = np.concatenate([rest, -rest[-2:0:-1]])
-    spectrum = fft.rfft(odd, axis=0) * response(fft.rfftfreq(len(odd), dt))
-    return fft.irfft(spectrum, len(odd), axis=0)[:n] + chord * keep_chord
+    spectrum = np.fft.rfft(odd, axis=0) * response(np.asarray(np.fft.rfftfreq(len(odd), dt), np.float64))
+    return np.fft.irfft(spectrum, len(odd), axis=0)[:n] + chord * keep_chord
 
 
 def _pair(reference: ArrayLike, signal: ArrayLike) -> tuple[Array, Array]:

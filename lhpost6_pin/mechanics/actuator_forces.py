@@ -66,10 +66,14 @@ def force_range(plant: Plant) -> ForceRange:
     )
 
 
-def required_forces(plant: Plant, motion: PlatenMotion) -> RequiredForces:
-    """Shares of the actuators' ranges that a motion of C and Euler angles requires; joints of a specimen are locked."""
+def required_forces(plant: Plant, motion: PlatenMotion, legs: Array | None = None) -> RequiredForces:
+    """Shares of the actuators' ranges that a motion of C and Euler angles requires; joints of a specimen are locked.
+
+    legs (n, n_legs): elongations of the legs on this motion (`leg_displacements`), where they are known.
+    """
     plant = lock_joints(plant)
-    legs, _ = leg_displacements(plant, motion.displacement)
+    if legs is None:
+        legs, _ = leg_displacements(plant, motion.displacement)
     rooms = [a.room for a in plant.machine.actuators]
     reachable = np.all(np.abs(legs[:, : plant.spools]) < rooms, axis=1, keepdims=True)
     motion = motion._replace(displacement=np.where(reachable, motion.displacement, 0.0))

@@ -42,14 +42,14 @@ def make_motion_check(plant: Plant) -> MotionCheck:
     single = np.array([a.area_b is None for a in machine.actuators])
 
     def check(displacement: Array, velocity: Array, acceleration: Array) -> list[Demand]:
-        moved, rate = leg_displacements(plant, displacement, velocity)
-        moved, rate = moved[:, : plant.spools], rate[:, : plant.spools]
+        legs, rate = leg_displacements(plant, displacement, velocity)
+        moved, rate = legs[:, : plant.spools], rate[:, : plant.spools]
         fed = np.where(rate >= 0.0, rate / speeds[:, 0], -rate / speeds[:, 1])
         found = [
             Demand("actuator velocity", names, fed, of_speed if reserve else OF_SPEED),
             Demand("actuator stroke", names, np.abs(moved) / strokes, "of its stroke"),
         ]
-        needed = required_forces(plant, PlatenMotion(displacement, velocity, acceleration))
+        needed = required_forces(plant, PlatenMotion(displacement, velocity, acceleration), legs)
         beyond, at = needed.share - rest.share, rest.share[0]
         push, pull = np.maximum(beyond, 0.0) / (1.0 - at), np.maximum(-beyond, 0.0) / (1.0 + at)
         more, less = span.half * np.maximum(beyond, 0.0), span.half * np.maximum(-beyond, 0.0)  # of force, from rest

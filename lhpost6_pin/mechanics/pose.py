@@ -89,7 +89,7 @@ def _platen_motion(moved, axes, body, motion):
         else:
             rho, linear, omega = body[0].rho_c, v[k], v[k, 3:6]
             platen_pose(q[k], axes, body, frame)
-            displacement[k, :3] = frame[3]
+            _set(frame[3], displacement[k])
             _add(from_body(frame, rho), displacement[k])
             _set(matrix_to_rpy(frame), displacement[k, 3:])
             tx, ty, tz = cross(omega, rho)
@@ -128,7 +128,7 @@ def _plant_motion(motion, body, found):
     for k in range(len(q)):
         euler, rates = displacement[k, 3:], velocity[k, 3:]
         frame_of_pose(displacement[k], body, frame)
-        q[k, :3] = frame[3]
+        _set(frame[3], q[k])
         q[k, 3], q[k, 4], q[k, 5], q[k, 6] = rpy_to_quaternion(euler)
         omega, alpha = turning(euler, rates), turning_rate(euler, rates, acceleration[k, 3:])
         of_c = to_body(frame, velocity[k])

@@ -17,6 +17,7 @@ __all__ += ["limit_peaks", "peak_of_demand"]
 _QUANTITIES = ("displacement", "velocity", "acceleration")
 _FULL = 1 + 1e-6  # a motion exactly at the limit passes despite rounding
 _CLOSE = 1e-4  # relative width to which the largest scale is bracketed
+_STRIDE = 8  # samples of which one is looked at first: 4 ms of a target, within which its demands hardly change
 _GOVERNING = 0.5  # of the largest share: samples with as much are looked at first, as demands are nearly linear
 
 
@@ -120,23 +121,31 @@ def largest_scale(target: Target, limits: MotionLimits, check: MotionCheck | Non
 
     Infinity for a target at rest (or below floating-point resolution). Actuator lengths and forces are not linear in
     the motion: with `check` the scale is bracketed below that of the axes, guided by the share of each trial. They are
-    nearly so: after the first trial only samples are looked at whose demand was a good part of the largest, and what
-    is found is looked at in all.
+    nearly so: only samples beside those are looked at whose demand was a good part of the largest in a first look at
+    some, and what is found is looked at in all.
     """
     highest = max(peak.utilisation for peak in _axis_peaks(target, limits))
     if highest < np.finfo(float).tiny:
         return float("inf")
-    high = 1 / highest
-    shares = _deciding(target, check, high) if check else np.zeros(len(target.time))
-    if check is None or shares.max() <= _FULL:
-        return _round_down(high * abs(target.reference.scale))
-    share, governing = float(shares.max()), np.zeros(len(shares), bool)
-    while True:
-        governing |= shares >= (_GOVERNING * shares.max() if np.isfinite(shares.max()) else 0.0)
-        found = _bracketed(target, check, high, share, governing)
-        shares = _deciding(target, check, found) if found > 0.0 else np.zeros(len(shares))
-        if not ((shares > _FULL) & ~governing).any():
-            return _round_down(found * abs(target.reference.scale))
+    found = high = 1 / highest
+    governing = np.zeros(len(target.time), bool)
+    if check is not None:
+        some = _governing(_deciding(target, check, high, slice(None, None, _STRIDE)))
+        governing = np.repeat(some, _STRIDE)[: len(governing)]
+    while check is not None:
+        share = float(_deciding(target, check, high, governing).max())
+        found = high if share <= _FULL else _bracketed(target, check, high, share, governing)
+        others = np.flatnonzero(~governing)
+        shares = _deciding(target, check, found, others) if found > 0.0 and others.size else np.zeros(len(others))
+        if not (shares > _FULL).any():
+            break
+        governing[others[_governing(shares)]] = True
+    return _round_down(found * abs(target.reference.scale))
+
+
+def _governing(shares: np.ndarray) -> np.ndarray:
+    """Samples whose share is a good part of the largest; all of them where that is not finite."""
+    return shares >= (_GOVERNING * shares.max() if np.isfinite(shares.max()) else 0.0)
 
 
 def _bracketed(target: Target, check: MotionCheck, high: float, share: float, governing: np.ndarray) -> float:
@@ -212,12 +221,12 @@ def _demands(
         return check(*(factor * x[some] for x in (motion.displacement, motion.velocity, motion.acceleration)))
 
 
-def _deciding(target: Motion, check: MotionCheck, factor: float, some: np.ndarray | slice = slice(None)) -> np.ndarray:
+def _deciding(motion: Motion, check: MotionCheck, factor: float, some: np.ndarray | slice = slice(None)) -> np.ndarray:
     """Largest share (n,) of the deciding demands at each of some samples of a motion, scaled."""
-    demands = _demands(target, check, factor, some)
+    demands = _demands(motion, check, factor, some)
     shares = [np.abs(demand.share).max(axis=1) for demand in demands if demand.decides]
     if not shares:
-        return np.zeros(1)
+        return np.zeros(len(motion.displacement[some]))
     return np.nan_to_num(np.max(shares, axis=0), nan=np.inf, posinf=np.inf)
 
 

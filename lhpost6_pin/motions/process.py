@@ -173,13 +173,14 @@ def make_target(
     lead = round(pad * rate)
     begin, count = int(ends * step) - lead, round((len(channels) - 1) * float(step)) + 2 * lead + 1
     size, angular = int(total * step), 2 * np.pi * frequency
+    moved = np.isin(AXES, [axis for axis, _ in pairs])
+    series = series[:, moved]  # the other axes stay at rest
     d, v, a = (
         _evaluate(series * factor, total, size)[begin : begin + count] for factor in (1.0, 1j * angular, -(angular**2))
     )
     w, w1, w2 = _rest_window(count, lead, rate)
-    moved = np.isin(AXES, [axis for axis, _ in pairs])
-    products = (w * d, w1 * d + w * v, w2 * d + 2 * w1 * v + w * a)
-    displacement, velocity, acceleration = (np.where(moved, x, 0.0) for x in products)
+    displacement, velocity, acceleration = motion_of_axes = np.zeros((3, count, len(AXES)))
+    motion_of_axes[:, :, moved] = w * d, w1 * d + w * v, w2 * d + 2 * w1 * v + w * a
     _refuse_infinite(motion.name, scale, displacement, velocity, acceleration)
     start = first * motion.time_step - lead / rate
     reference = Reference(motion.name, motion.source, scale, pairs, high_pass, low_pass, start, motion.time_scale)
@@ -261,8 +262,8 @@ def _gain(frequency: np.ndarray, high_pass: float, low_pass: float, settings: di
 
 
 def _evaluate(series: np.ndarray, total: int, size: int) -> np.ndarray:
-    """Fourier series of `total` samples, evaluated at `size` samples over the same time (size, 6)."""
-    return np.fft.irfft(series[: size // 2 + 1], size, axis=0) * (size / total)
+    """Fourier series of `total` samples, evaluated at `size` samples over the same time (size, n_axes)."""
+    return np.fft.irfft(series[: size // 2 + 1].T, size).T * (size / total)
 
 
 def _rest_window(count: int, pad: int, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

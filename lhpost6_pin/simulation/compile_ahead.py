@@ -14,6 +14,7 @@ from numba.core.types import Type
 
 from ..control.loop import control_packed
 from ..core.compiled import cache_folder
+from ..core.garbage import collect_less
 from .engine_fused import log_packed
 from .engine_pinocchio import staggered_packed
 
@@ -28,11 +29,12 @@ def _arrays(*dimensions: int) -> tuple[Type, ...]:
 
 
 SIGNATURES = {
-    staggered_packed: (*_arrays(1), types.float64, *_arrays(1, 1, 1)),
     control_packed: (types.int64, *_arrays(2, 1, 1, 1, 2, 2, 2)),
+    staggered_packed: (*_arrays(1), types.float64, *_arrays(1, 1, 1)),
     log_packed: (types.int64, *_arrays(1, 2, 2, 2, 2, 2, 2)),
 }
-"""What a step calls from Python, in the order in which it is compiled, with the types of its arguments."""
+"""What a step calls from Python, with the types of its arguments, in the order in which it is compiled: last what has
+parts in common with the equilibrium, which the first process compiles meanwhile."""
 
 
 def compile_ahead() -> "subprocess.Popen[bytes] | None":
@@ -56,5 +58,6 @@ def wait_for(compiling: "subprocess.Popen[bytes] | None") -> None:
 
 def compile_step() -> None:
     """Compile the step into the cache."""
+    collect_less()
     for function, signature in SIGNATURES.items():
         function.compile(signature)  # type: ignore[attr-defined]

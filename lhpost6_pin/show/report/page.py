@@ -16,6 +16,7 @@ import platform
 import re
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
@@ -253,10 +254,23 @@ def versions() -> dict[str, str]:
 
 @functools.cache
 def packed_plotly() -> str:
-    """plotly.js as shipped with the plotly package: deflated, then base64 (a third of its plain size)."""
+    """plotly.js as shipped with the plotly package: deflated, then base64 (a third of its plain size).
+
+    Kept in the cache of compiled code, since packing takes longer than all else of a page.
+    """
+    from ...core.compiled import cache_folder
+
+    folder = cache_folder()
+    kept = None if folder is None else folder / f"plotly-{metadata.version('plotly')}.txt"
+    if kept is not None and kept.is_file():
+        return kept.read_text(encoding="ascii")
     from plotly.offline import get_plotlyjs
 
-    return base64.b64encode(zlib.compress(get_plotlyjs().encode(), 4)).decode()
+    packed = base64.b64encode(zlib.compress(get_plotlyjs().encode(), 4)).decode()
+    if kept is not None:
+        with suppress(OSError), write_whole(kept) as own:
+            own.write_text(packed, encoding="ascii")
+    return packed
 
 
 def beside(name: str) -> str:

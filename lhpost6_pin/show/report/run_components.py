@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from ...core.arrays import Array
 from ...data.metrics import channel, kinds, labels, peaks, sampling
 from ...simulation.limit_use import TOLERANCE, Limits, force_use, shares_of_limit
 from .page import Block, Figure, Table, bar, missing, number
@@ -25,7 +26,7 @@ def force_blocks(record: xr.Dataset, limits: Limits) -> list[Block]:
     blocks: list[Block] = [missing(absent, "The recorded part of forces and strokes is shown.")] if absent else []
     if "actuator_force" in record:
         words = "Chamber pressures times piston areas, P_A A₁ − P_B A₂; positive extends the actuator."
-        rows = _rows_by_kind(record, "Force", "actuator_force", "actuator", "force")
+        rows = _channel_by_kind(record, "Force", "actuator_force", "actuator", "force")
         if "actuator_pull" in limits:
             rows = [_with_force_limits(row, record, limits) for row in rows]
             words += " Dashed lines: push and pull capacity, where the forces approach them."
@@ -49,7 +50,8 @@ def pressure_blocks(record: xr.Dataset, limits: Limits) -> list[Block]:
     rows = []
     for side, dim in (("a", "actuator"), ("b", "horizontal")):
         if f"chamber_pressure_{side}" in record:
-            rows += _rows_by_kind(record, f"Chamber {side.upper()},", f"chamber_pressure_{side}", dim, "pressure")
+            name = f"chamber_pressure_{side}"
+            rows += _channel_by_kind(record, f"Chamber {side.upper()},", name, dim, "pressure")
     if rows:
         words = "Pressure in each chamber."
         if supply is not None:
@@ -67,12 +69,12 @@ def strut_blocks(record: xr.Dataset, limits: Limits) -> list[Block]:
     """Return the struts' gas pressure and, where their area is known, their pull."""
     if "strut_pressure" not in record:
         return [missing(["strut_pressure"], "Hold-down struts are not drawn.")]
-    rows = _rows_by_kind(record, "Gas pressure", "strut_pressure", "strut", "pressure")
+    rows = _channel_by_kind(record, "Gas pressure", "strut_pressure", "strut", "pressure")
     areas = limits.get("strut_area", np.array([]))
     words = "Nitrogen pressure in each hold-down strut."
     if len(areas) == record.sizes["strut"]:
-        record = record.assign(strut_pull=record["strut_pressure"] * xr.DataArray(areas, dims="strut"))
-        rows += _rows_by_kind(record, "Pull on the platen", "strut_pull", "strut", "force")
+        pull = channel(record, "strut_pressure") * areas
+        rows += _rows_by_kind("Pull on the platen", pull, labels(record, "strut"), "force")
         words += " The pull is pressure times area."
     else:
         words += " The pull is not drawn: the area of the struts was not given."
@@ -130,9 +132,12 @@ def _use_of_actuators(record: xr.Dataset, limits: Limits) -> Table:
     return Table("Forces and strokes: demand over capacity", header, list(zip(*cells, strict=True)))
 
 
-def _rows_by_kind(record: xr.Dataset, title: str, name: str, dim: str, scale: str) -> list[Row]:
+def _channel_by_kind(record: xr.Dataset, title: str, name: str, dim: str, scale: str) -> list[Row]:
+    return _rows_by_kind(title, channel(record, name), labels(record, dim), scale)
+
+
+def _rows_by_kind(title: str, values: Array, names: Sequence[str], scale: str) -> list[Row]:
     """One row per kind of component: H1 to H4 in one, V1 to V6 in the next."""
-    values, names = channel(record, name), labels(record, dim)
     rows = []
     for own in kinds(names):
         span = names[own[0]] if len(own) == 1 else f"{names[own[0]]}–{names[own[-1]]}"

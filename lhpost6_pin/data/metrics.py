@@ -111,8 +111,7 @@ def track(record: xr.Dataset, quantity: str, *, errors: bool = True) -> list[Tra
     """Return the tracking of `quantity` on every axis; empty if the record has no such motion.
 
     A delay is not-a-number where its removal does not reduce the error, or where it is at the end of the range in which
-    it is sought. Without `errors` only peaks are evaluated, not
-    RRMSE and delay, which take far longer.
+    it is sought. Without `errors` only peaks are evaluated, not RRMSE and delay, which take far longer.
     """
     if f"platen_{quantity}" not in record:
         return []

@@ -241,7 +241,6 @@ def resample_band_limited(x: ArrayLike, t_old: ArrayLike, t_new: ArrayLike, half
     return result
 
 
-# ---------------------------------------------------------------------------------------------- helpers
 def fast_length(n: int) -> int:
     """Least length of at least `n` without prime factors beyond 5, at which Fourier transforms are fast.
 
@@ -257,6 +256,7 @@ def fast_length(n: int) -> int:
     return best
 
 
+# ---------------------------------------------------------------------------------------------- helpers
 def _filtered(x: Array, dt: float, response: Callable[[Array], NDArray[Any]], keep_chord: bool = True) -> Array:
     """Apply a frequency response to x less its chord, continued by odd reflection; put the chord back.
 

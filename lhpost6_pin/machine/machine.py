@@ -17,7 +17,7 @@ from ..effects.registry import LAWS
 from .accelerometers import ACCELEROMETER, accelerometers_of
 from .components import Actuator, Floor, Hydraulics, Limits, Platen, PowerSupply, Strut, Vec3
 from .library import effect_entry, make_named_effect, size_of
-from .machine_checks import check_actuator, check_machine, check_names, check_supply
+from .machine_checks import check_actuator, check_machine, check_names
 from .parameters import EffectEntry, Parameters, load_parameters, override_parameters
 from .recorded_specimen import recorded_mounting
 from .schema import build_section
@@ -289,7 +289,6 @@ def build_machine(
         specimen=specimen,
     )
     check_machine(machine)
-    check_supply(machine.power_supply, parameters.origin)
     try:
         _ = machine.added_effects  # raises for an effect that cannot be
     except (ParameterError, UnknownNameError) as error:

@@ -8,7 +8,7 @@ from .components import Accelerometer, Actuator, Floor, Hydraulics, Limits, Plat
 from .parameters import Parameters
 from .structure import Structure
 
-__all__ = ["check_actuator", "check_machine", "check_names", "check_supply"]
+__all__ = ["check_actuator", "check_machine", "check_names"]
 
 _COMPARISONS = ("estimates", "table_2_2", "table_2_2_payload")
 """Sections of numbers to compare with; their keys are free."""
@@ -54,14 +54,6 @@ def check_names(parameters: Parameters, components: list[str], kinds: set[str], 
             raise ParameterError(f"{parameters.origin}: unknown key {path}; {hint}")
 
 
-def check_supply(supply: PowerSupply, origin: str) -> None:
-    """Refuse gas pressures of accumulators that are out of order."""
-    given = (supply.precharge, supply.lowest, supply.charged)
-    if None not in given and not supply.precharge <= supply.lowest < supply.charged:  # type: ignore[operator]
-        words = ", ".join(f"{value:g}" for value in given)
-        raise ParameterError(f"{origin}: power_supply: precharge <= lowest < charged is needed [Pa]; got {words}")
-
-
 def check_actuator(actuator: Actuator, origin: str) -> None:
     """Refuse an actuator that lacks what its valve and mount need, or whose stroke leaves no oil."""
     needed = {"4-way": ("area_b", "chamber_b"), "3-way": ()}[actuator.valve]
@@ -88,6 +80,7 @@ def check_machine(machine: Structure) -> None:
     origin = machine.parameters.origin
     if machine.hydraulics.return_pressure >= machine.hydraulics.supply_pressure:
         raise ParameterError(f"{origin}: hydraulics.return_pressure is not below hydraulics.supply_pressure")
+    _check_supply(machine.power_supply, origin)
     for quantity in ("displacement", "velocity", "acceleration"):
         still = [AXES[k] for k in machine.axes if not getattr(machine.limits, quantity)[k]]
         if still:
@@ -108,3 +101,11 @@ def check_machine(machine: Structure) -> None:
     n_platen = machine.platen.bearing_plane
     if n_platen[0] != 0.0 or n_platen[1] != 0.0 or n_platen[2] == 0.0:
         raise ParameterError(f"{origin}: platen.bearing_plane must lie straight below C: [0, 0, z]")
+
+
+def _check_supply(supply: PowerSupply, origin: str) -> None:
+    """Refuse gas pressures of accumulators that are out of order."""
+    given = (supply.precharge, supply.lowest, supply.charged)
+    if None not in given and not supply.precharge <= supply.lowest < supply.charged:  # type: ignore[operator]
+        words = ", ".join(f"{value:g}" for value in given)
+        raise ParameterError(f"{origin}: power_supply: precharge <= lowest < charged is needed [Pa]; got {words}")

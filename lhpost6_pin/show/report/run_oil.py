@@ -11,13 +11,13 @@ from ...simulation.oil_use import Bank, oil_use
 from .page import Block, Table, missing, number
 from .plots import ACHIEVED, Row, Trace
 from .run_components import draw_over_time
-from .scales import Scale, percent
+from .scales import SCALES, Scale, percent
 
 __all__ = ["oil_blocks"]
 
 FLOW = Scale(6e4, "l/min")
 VOLUME = Scale(1e3, "l")
-PRESSURE = Scale(1e-6, "MPa")
+PRESSURE = SCALES["pressure"]
 
 
 def oil_blocks(record: xr.Dataset) -> list[Block]:

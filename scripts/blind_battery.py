@@ -37,6 +37,9 @@ from lhpost6_pin.studies.workers import results_of, workers
 MACHINE = "machine.toml"
 """In the folder of a case: its table as its lab knows it; the LHPOST6 where there is none."""
 
+DRAW = "draw.txt"
+"""In the folder of a battery: the options by which its cases were drawn."""
+
 RESULTS = Path(__file__).parent / "battery"
 """Folder of the latest published scores."""
 
@@ -89,11 +92,21 @@ def baseline_rows(folder: Path, names: list[str], pairs: list[tuple[dict, dict]]
     return rows
 
 
-def command_of(asked: argparse.Namespace) -> str:
-    """The command that was run."""
+def drawn_by(asked: argparse.Namespace) -> str:
+    """The options by which cases are drawn."""
     length = f" --{asked.campaign}" if asked.campaign != "full" else ""
-    length += "".join(f" --{option}" for option in ("anew", "fewer", "baselines") if getattr(asked, option))
-    return f"python scripts/blind_battery.py --cases {asked.cases} --seed {asked.seed}{length}"
+    varied = "".join(f" --{option}" for option in ("anew", "fewer") if getattr(asked, option))
+    return f"--cases {asked.cases} --seed {asked.seed}{length}{varied}"
+
+
+def refuse_other_draw(folder: Path, draw: str) -> None:
+    """Exit if the folder holds cases of another draw, whose labels would not be those of these: their names recur."""
+    path, known = folder / DRAW, draw
+    if path.exists() or any(folder.iterdir()):
+        known = path.read_text(encoding="utf-8") if path.exists() else "unknown"
+    if known != draw:
+        sys.exit(f"{folder}: holds cases of another draw ({known}): choose another --out, or remove it")
+    path.write_text(draw, encoding="utf-8")
 
 
 def main() -> None:
@@ -113,6 +126,7 @@ def main() -> None:
     asked = parser.parse_args()
     folder = asked.out
     folder.mkdir(parents=True, exist_ok=True)
+    refuse_other_draw(folder, drawn_by(asked))
     cases = draw_cases(asked.cases, asked.seed, asked.campaign, Variety(asked.anew, asked.fewer))
     phases = (1,) if asked.campaign == "brief" else (1, 2)
     with workers(asked.jobs, asked.dask):
@@ -129,8 +143,9 @@ def main() -> None:
         beside.write_text(text, encoding="utf-8")
     print(text)
     if asked.publish:
+        command = f"python scripts/blind_battery.py {drawn_by(asked)}{' --baselines' if asked.baselines else ''}"
         words = [option for option in ("anew", "fewer") if getattr(asked, option)]
-        publish(text, RESULTS / f"{'_'.join(['results', *words])}.md", "Scores of the blind battery", command_of(asked))
+        publish(text, RESULTS / f"{'_'.join(['results', *words])}.md", "Scores of the blind battery", command)
     if asked.check and (why := wrong(labels, answered, "family first", LEAST)):
         sys.exit(why)
 

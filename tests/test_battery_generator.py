@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from battery import cases, generate, hidden, machines, motions, rates, reach, scoring, sensors, simulate, table
+from blind_battery import refuse_other_draw
 
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.identification.calibration.bin_rows import dense_rows, row_by_column
@@ -385,3 +386,14 @@ def test_baselines_see_the_columns_of_all_residuals():
     for k in range(2):
         seen = dense_rows(bins).times(np.eye(2)[k])
         np.testing.assert_array_equal(seen.ravel(), row_by_column(bins[..., k], np.ones((4, 3))).ravel())
+
+
+def test_a_folder_of_another_draw_is_refused(tmp_path):
+    refuse_other_draw(tmp_path, "--cases 3 --seed 1")
+    refuse_other_draw(tmp_path, "--cases 3 --seed 1")  # resumes
+    with pytest.raises(SystemExit, match="another draw .--cases 3 --seed 1.: choose another --out"):
+        refuse_other_draw(tmp_path, "--cases 5 --seed 1")  # cases of the same names, but other effects
+    (tmp_path / "unknown").mkdir()
+    (tmp_path / "unknown" / "seals.txt").touch()
+    with pytest.raises(SystemExit, match="unknown"):
+        refuse_other_draw(tmp_path / "unknown", "--cases 3 --seed 1")

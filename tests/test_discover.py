@@ -42,7 +42,7 @@ from lhpost6_pin.discovery.residual_function import (
     with_residual_function,
 )
 from lhpost6_pin.discovery.scores import Background, Block, Score, block_of, less_noise, make_block, score
-from lhpost6_pin.discovery.screening import FORM, _by_rank, _without_parts, found_there, score_pairs
+from lhpost6_pin.discovery.screening import FORM, _by_rank, _without_parts, left_by_form, score_pairs
 from lhpost6_pin.discovery.search import (
     _as_well,
     _on_more_components,
@@ -846,11 +846,21 @@ def test_a_residual_function_has_the_size_of_the_force_that_is_missing(found):
 def test_what_imitates_the_form_of_a_droop_is_on_the_actuators_that_it_feeds(found):
     droop = replace(found.search.added[0], candidate=candidate("supply_droop", "supply"), gain=1e5)
     search = replace(found.search, added=(droop,))
-    assert found_there(search, candidate("flow_curve_error", "H1", "H2")) == 1e5
-    assert found_there(search, candidate("piston_leakage", "H1")) == 0.0  # seldom confused with it
-    assert found_there(search, candidate("stribeck_friction", "H1")) == 0.0
+    share = search.numbers.number("accept.again")
+    assert left_by_form(search, candidate("flow_curve_error", "H1", "H2")) == share * 1e5
+    assert left_by_form(search, candidate("piston_leakage", "H1")) == 0.0  # seldom confused with it
+    assert left_by_form(search, candidate("stribeck_friction", "H1")) == 0.0
     curve = replace(droop, candidate=candidate("flow_curve_error", "H1"))
-    assert found_there(replace(search, added=(curve,)), droop.candidate) == 0.0  # one valve is no supply
+    assert left_by_form(replace(search, added=(curve,)), droop.candidate) == 0.0  # one valve is no supply
+
+
+def test_a_little_on_one_of_the_legs_of_an_effect_may_be_due_to_its_form(found):
+    leak = replace(found.search.added[0], candidate=candidate("null_leakage", "H1", "H2", "H3", "H4"), gain=1e5)
+    search = replace(found.search, added=(leak,))
+    share = search.numbers.number("accept.part")
+    assert left_by_form(search, candidate("spool_null_bias", "H2")) == share * 1e5  # seldom confused with it
+    assert left_by_form(search, candidate("spool_null_bias", "V2")) == 0.0  # not one of its legs
+    assert left_by_form(search, candidate("stribeck_friction", "H2")) == 0.0  # no flow
 
 
 def test_no_strength_that_leaves_the_platen_no_inertia_is_fitted(found):

@@ -23,7 +23,7 @@ from .estimates import absorbing, is_absorbed
 from .scores import Block, Columns, Score, block_of, less_noise, make_block, score
 from .search_state import Linearisation, Round, Scored, Search
 
-__all__ = ["CandidatePair", "found_there", "is_confused", "screen", "score_pairs"]
+__all__ = ["CandidatePair", "is_confused", "left_by_form", "screen", "score_pairs"]
 
 
 FORM = "may be due to the form of an effect added there or at the supply"
@@ -46,7 +46,7 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
     def judged(candidate: Candidate, one: Score, explained: Sequence[Array]) -> Scored:
         less = weigh.lowered(explained, one) if explained else Lowered(one.gain, 0.0, 0.0, 0.0)
         why = refusal([candidate.family], one, less, numbers, absorbed=is_absorbed(candidate, ends))
-        if not why and less.gain < numbers.number("accept.again") * found_there(found, candidate):
+        if not why and less.gain < left_by_form(found, candidate):
             why = FORM
         return Scored(candidate, one, less.gain, less.share, why)
 
@@ -116,20 +116,20 @@ def _by_rank(scored: Sequence[Scored], simpler: float) -> list[Scored]:
     return sorted(found, key=rank)
 
 
-def found_there(found: Search, candidate: Candidate) -> float:
-    """Largest gain of an effect added whose form may leave what a candidate explains.
+def left_by_form(found: Search, candidate: Candidate) -> float:
+    """Log-likelihood of a candidate up to which it may be due to the form of an effect added.
 
-    One that is often confused with it on some of the same components or their supply, or shows in the same residuals on
-    all of them.
+    A share `accept.again` of the gain of one that is often confused with it on some of the same components or their
+    supply, or shows in the same residuals on all of them; a share `accept.part` of one that does so on these and more.
     """
-    shows, there, gain = set(candidate.family.shows_in), set(candidate.components), 0.0
+    shows, there, least = set(candidate.family.shows_in), set(candidate.components), 0.0
     for added in found.added:
-        own = set(added.candidate.components)
-        if (_confused(added.candidate, candidate) and _meet(added.candidate, candidate)) or (
-            own == there and shows & set(added.candidate.family.shows_in)
-        ):
-            gain = max(gain, added.gain)
-    return gain
+        own, alike = set(added.candidate.components), bool(shows & set(added.candidate.family.shows_in))
+        if (_confused(added.candidate, candidate) and _meet(added.candidate, candidate)) or (own == there and alike):
+            least = max(least, found.numbers.number("accept.again") * added.gain)
+        elif there < own and alike:
+            least = max(least, found.numbers.number("accept.part") * added.gain)
+    return least
 
 
 def is_confused(found: Search, candidate: Candidate) -> bool:

@@ -19,7 +19,7 @@ from .candidates import Candidate
 from .contest import best_of, loss_without, removed
 from .estimates import is_absorbed, moved_together
 from .joint_fit import refined
-from .screening import found_there, is_confused, score_pairs, screen
+from .screening import is_confused, left_by_form, score_pairs, screen
 from .search_state import Linearisation, Scored, Search, best_per_family, linearise
 
 __all__ = ["refit", "search", "without_effect"]
@@ -197,7 +197,7 @@ def _proven_in_full(found: Search, one: Scored, progress: Progress) -> Search | 
     if more is None:
         return None
     best, share = more.added[-1], _share_explained(found, more)
-    if best.gain < n("accept.again") * found_there(found, best.candidate):
+    if best.gain < left_by_form(found, best.candidate):
         own = next(o for o in found.rounds[-1].scored if o.candidate == best.candidate)
         consistent = (
             own.score.held_out.min() > 0.0 and own.score.held_out.sum() >= n("accept.consistent") * own.score.gain

@@ -2,7 +2,7 @@
 
     python scripts/build_docs.py [--out out/docs]
 
-Needs `pip install 'lhpost6-pin[docs]'`. The site is put together in a temporary folder, built by mkdocs with --strict,
+Needs `pip install '.[docs]'`. The site is put together in a temporary folder, built by mkdocs with --strict,
 and moved to --out whole or not at all. It loads nothing from elsewhere: open index.html, or put it on any web server.
 """
 

@@ -2,7 +2,7 @@
 
     python scripts/fmu_round_trip.py [--seconds 2] [--out DIR]
 
-Needs `pip install 'lhpost6-pin[fmi]' fmpy`. Both take the same spool commands, a sine per actuator.
+Needs `pip install pythonfmu==0.7.0 fmpy`. Both take the same spool commands, a sine per actuator.
 """
 
 import time

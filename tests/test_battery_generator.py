@@ -391,7 +391,7 @@ def test_baselines_see_the_columns_of_all_residuals():
 def test_a_folder_of_another_draw_is_refused(tmp_path):
     refuse_other_draw(tmp_path, "--cases 3 --seed 1")
     refuse_other_draw(tmp_path, "--cases 3 --seed 1")  # resumes
-    with pytest.raises(SystemExit, match="another draw .--cases 3 --seed 1.: choose another --out"):
+    with pytest.raises(SystemExit, match=r"another draw \(--cases 3 --seed 1\): choose another --out"):
         refuse_other_draw(tmp_path, "--cases 5 --seed 1")  # cases of the same names, but other effects
     (tmp_path / "unknown").mkdir()
     (tmp_path / "unknown" / "seals.txt").touch()

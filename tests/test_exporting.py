@@ -113,6 +113,17 @@ def test_a_wrong_unit_is_seen_after_the_import(lhpost6, tmp_path):
     assert "reaches 20: mm or in for m?" in ended.words
 
 
+def test_data_that_are_no_export_are_not_overwritten(lhpost6, tmp_path, record):
+    record.to_netcdf(tmp_path / "run7.nc", engine="h5netcdf")
+    own = "time [s],Table disp [in]\n0,1\n1,2\n"
+    (tmp_path / "run7.csv").write_text(own)
+    assert refused(lhpost6("export", "run7.nc", "--to", "csv"), "run7.csv: is there and is no earlier export")
+    assert (tmp_path / "run7.csv").read_text() == own
+    assert refused(lhpost6("export", "run7.nc", "--to", "csv", "--out", "run7.mat"), "of format csv ends in .csv")
+    for _ in range(2):  # an earlier export is written again
+        assert lhpost6("export", "run7.nc", "--to", "csv", "--out", "run8.csv").code == 0
+
+
 def test_an_export_is_imported_without_a_map(lhpost6, tmp_path, record):
     record.to_netcdf(tmp_path / "a.nc", engine="h5netcdf")
     assert lhpost6("export", "a.nc", "--to", "csv")[:2] == (0, "wrote a.csv\n")

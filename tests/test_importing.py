@@ -3,6 +3,7 @@
 import contextlib
 import re
 import struct
+from dataclasses import replace
 from pathlib import Path
 from unittest import mock
 
@@ -523,7 +524,7 @@ def test_a_bad_map_is_refused_with_file_and_key(tmp_path, old, new, phrase):
         ({"strut_pressure[S1]": Source("c1")}, "has S1, but not S2, S3; map them too"),
         ({"supply_pressure": Source("c9")}, "no column 'c9' in 'run.csv'; columns are 'c1', 'c2', 'c3'"),
         ({"supply_pressure": Source("c*")}, "'c\\*' could be any of run.csv column 1 'c1', run.csv column 2"),
-        ({"supply_pressure": Source(4)}, "no column 4; run.csv has 1 to 3"),
+        ({"supply_pressure": Source(4)}, "column 4 of run.csv is no channel; these are 1 'c1', 2 'c2', 3 'c3'"),
         ({"supply_pressure": Source("c1", file="other*")}, "no file is called 'other\\*'; files are 'run.csv'"),
         ({"supply_pressure": Source("c2")}, "'c2' of run.csv: unit 'g' cannot be converted to Pa"),
         ({"supply_pressure": Source("c1", "flob")}, "unknown unit 'flob'"),
@@ -537,11 +538,22 @@ def test_a_map_that_does_not_fit_is_refused_with_its_key(channels, phrase):
     assert "map.toml" in str(caught.value)
 
 
+def test_a_column_has_the_number_that_it_has_in_the_file(tmp_path):
+    path = put(tmp_path, "run.csv", "p [Pa],time [s],q [Pa]\n5,0,7\n5,1,7\n")
+    for number, value in ((1, 5.0), (3, 7.0)):
+        record = make_imported_record(load_raw(path), supply(Source(number)), LABELS)
+        assert np.all(record["supply_pressure"] == value)
+    with pytest.raises(
+        RecordError, match=r"column 2 of .*run\.csv is no channel; these are 1 'p \[Pa\]', 3 'q \[Pa\]'"
+    ):
+        make_imported_record(load_raw(path), supply(Source(2)), LABELS)
+
+
 def test_two_columns_of_one_name_need_a_number(tmp_path):
     path = put(tmp_path, "run.csv", "time [s],p [Pa],p [Pa]\n0,1,2\n0.1,3,4\n")
     with pytest.raises(RecordError, match=r"could be any of .* give the column's number"):
         make_imported_record(load_raw(path), supply(Source("p [[]Pa]")), LABELS)
-    record = make_imported_record(load_raw(path), supply(Source(2)), LABELS)
+    record = make_imported_record(load_raw(path), supply(Source(3)), LABELS)
     np.testing.assert_array_equal(record["supply_pressure"], [2, 4])
 
 
@@ -721,7 +733,7 @@ def test_a_typical_channel_list_is_guessed_right(tmp_path):
 )
 def test_one_name_is_guessed_as(name, unit, channel):
     columns = raw(VALUES, ["Pa", unit, None], TIME)
-    columns = columns.__class__(columns.source, "table", ("Supply Press", name, "?"), columns.units, VALUES, TIME)
+    columns = replace(columns, names=("Supply Press", name, "?"))
     found = guess_map([columns], LABELS).channels.channels
     assert set(found) - {"supply_pressure"} == ({channel} if channel else set())
 
@@ -730,9 +742,9 @@ def test_a_guess_says_what_it_left_open(tmp_path):
     path = put(tmp_path, "run.csv", "time,Long Displ,Long Displ fbk [in],Foo\n0,1,2,3\n1,2,3,4\n")
     _, remarks = guess_map(load_raw(path), LABELS)
     text = "\n".join(remarks)
-    assert "add the unit of platen_displacement[x]: column 1" in text
-    assert "also like platen_displacement[x]: column 2" in text
-    assert '"CHANNEL" = { column = "Foo" }  # not recognised: column 3 of run.csv' in text
+    assert "add the unit of platen_displacement[x]: column 2" in text  # after time
+    assert "also like platen_displacement[x]: column 3" in text
+    assert '"CHANNEL" = { column = "Foo" }  # not recognised: column 4 of run.csv' in text
     assert (
         '"platen_displacement[yaw]" = { unit = "rad", constant = 0.0 }  # not found; if it is known to be zero' in text
     )

@@ -29,6 +29,10 @@ _OPTIONAL = {
     "pythonfmu": "export as an FMU: pip install pythonfmu==0.7.0",
     "openseespy": "OpenSees specimens: pip install openseespy; on Debian also apt-get install libblas3 liblapack3",
     "control": "LQG example: pip install control",
+    "nptdms": "TDMS files: pip install nptdms",
+    "pyarrow": "Parquet files: pip install pyarrow",
+    "SALib": "which uncertain number matters most in an ensemble: pip install SALib",
+    "distributed": 'ensembles on a cluster: pip install "dask[distributed]"',
 }
 
 _LIBRARIES = {"openseespy": ("blas", "lapack")}

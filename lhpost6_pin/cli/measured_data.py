@@ -117,13 +117,14 @@ def export(
     json: opt.Json = False,
 ) -> None:
     """Write a record as CSV, MATLAB v5 or Parquet, with the unit in every column's name."""
-    from ..data.importing import FORMATS, export_record
+    from ..data.importing import FORMATS, export_record, refuse_what_is_no_export
     from ..data.records import load_record
 
     dataset = load_record(record)
     path = out or record.with_suffix(FORMATS.get(to, ""))
     if path.exists() and path.samefile(record):
         raise RecordError(f"{path}: is the record to export; name another file with --out")
+    refuse_what_is_no_export(path)
     export_record(dataset, path, to)
     print_result(json, dict, lambda: None, [path])
 

@@ -56,7 +56,7 @@ def import_opensees() -> Any:
         import openseespy.opensees as ops
     except (ImportError, RuntimeError) as error:
         raise SimulationError(
-            "an OpenSees model needs openseespy: pip install 'lhpost6-pin[opensees]'; on Debian and Ubuntu its "
+            "an OpenSees model needs openseespy: pip install openseespy; on Debian and Ubuntu its "
             f"libraries too: apt-get install libblas3 liblapack3 ({error})"
         ) from error
     return ops

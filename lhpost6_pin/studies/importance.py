@@ -45,7 +45,7 @@ def importances(names: list[str], coordinates: Array, result: Array, numbers: Pa
     try:
         from SALib.analyze import rbd_fast
     except ImportError:
-        raise ParameterError('importance needs SALib: pip install "lhpost6-pin[ensembles]"') from None
+        raise ParameterError('importance needs SALib: pip install SALib') from None
     some = np.isfinite(result)
     y, x = result[some], coordinates[some]
     if len(y) < FEWEST or np.ptp(y) <= 1e-12 * np.abs(y).max():

@@ -45,7 +45,7 @@ def _client(jobs: int, address: str) -> Iterator[None]:
     try:
         from dask.distributed import Client, LocalCluster
     except ImportError:
-        raise ParameterError(f'--dask {address}: needs Dask: pip install "lhpost6-pin[dask]"') from None
+        raise ParameterError(f'--dask {address}: needs Dask: pip install "dask[distributed]"') from None
     if address != LOCAL:
         try:
             client = Client(address, timeout="10s")

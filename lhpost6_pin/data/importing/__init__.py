@@ -6,7 +6,7 @@ record; `find_tests` finds the files of many tests.
 
 from .build import described_sources, make_imported_record
 from .channel_map import ChannelMap, Source, TestFacts, load_map, save_map
-from .exporting import FORMATS, channel_units, export_record
+from .exporting import FORMATS, channel_units, export_record, refuse_what_is_no_export
 from .guess import Guess, guess_map, is_export, other_columns
 from .many import FileOfTest, find_tests
 from .raw import RawTest
@@ -23,4 +23,4 @@ __all__ += [
     "load_map",
     "load_raw",
 ]
-__all__ += ["make_imported_record", "other_columns", "save_map"]
+__all__ += ["make_imported_record", "other_columns", "refuse_what_is_no_export", "save_map"]

@@ -40,7 +40,8 @@ class Source:
     """Source of a channel: a column, or a known constant.
 
     Its value in SI is sign · gain · (column + offset), offset in the column's unit. `column` is a name, a pattern
-    (`Long*fbk`) or the column's number from 1; `file` a pattern for the file's name. The default `unit` is the file's.
+    (`Long*fbk`) or the column's number in the file from 1, a column of time counted; `file` a pattern for the file's
+    name. The default `unit` is the file's.
     """
 
     column: str | int | None = None
@@ -115,7 +116,8 @@ def save_map(channels: ChannelMap, path: Path | str, remarks: Sequence[str] = ()
     lines = [
         "# Which column of the data files is which channel of a record. A channel's value in SI is",
         "# sign * gain * (column + offset), offset in the column's unit; constant = 0 instead of a column for what is",
-        "# known and was not measured. column is a name, a pattern (Long*fbk) or a number from 1.",
+        "# known and was not measured. column is a name, a pattern (Long*fbk) or its number in the",
+        "# file from 1, a column of time counted.",
         "",
         "[test]",
         *(f"{key} = {_toml(value)}" for key, value in test.items() if value is not None),
@@ -270,9 +272,13 @@ def find_column(source: Source, raws: Sequence[RawTest], where: str) -> tuple[in
         first = raws[files[0]]
         if len(files) > 1:
             raise RecordError(f'{where}: column {source.column} of which file? add file = "..."')
-        if not 1 <= source.column <= len(first.names):
-            raise RecordError(f"{where}: no column {source.column}; {first.source} has 1 to {len(first.names)}")
-        return files[0], source.column - 1
+        if source.column not in first.numbers:
+            held = ", ".join(f"{n} {name!r}" for n, name in zip(first.numbers[:12], first.names, strict=False))
+            more = "" if len(first.numbers) <= 12 else f" to {first.numbers[-1]}"
+            raise RecordError(
+                f"{where}: column {source.column} of {first.source} is no channel; these are {held}{more}"
+            )
+        return files[0], first.numbers.index(source.column)
     every = [(k, j, name) for k in files for j, name in enumerate(raws[k].names)]
     wanted, names = str(source.column), [name for *_, name in every]
     found = [(k, j) for k, j, name in every if (name == wanted if wanted in names else _like(name, wanted))]
@@ -281,7 +287,9 @@ def find_column(source: Source, raws: Sequence[RawTest], where: str) -> tuple[in
     if not found:
         near, files_ = meant(wanted, names), shown([raws[k].source for k in files])
         raise RecordError(f"{where}: no column {wanted!r} in {files_}; {near}columns are {shown(names, 40)}")
-    places = ", ".join(f"{Path(raws[k].source).name} column {j + 1} {raws[k].names[j]!r}" for k, j in found[:6])
+    places = ", ".join(
+        f"{Path(raws[k].source).name} column {raws[k].numbers[j]} {raws[k].names[j]!r}" for k, j in found[:6]
+    )
     raise RecordError(f'{where}: {wanted!r} could be any of {places}; give the column\'s number, or file = "..."')
 
 

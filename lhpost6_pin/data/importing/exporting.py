@@ -1,6 +1,7 @@
 """Records as CSV, MATLAB v5 and Parquet: a column a channel, its unit in its name, and the attributes beside them."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ from ...core.files import write_whole
 from ..channels import LAYOUT_VERSION, channel_name, channel_unit, columns_of
 from ..layout_faults import layout_faults
 from .raw import need_package
+from .raw_files import load_raw
 
-__all__ = ["FORMATS", "channel_units", "export_record"]
+__all__ = ["FORMATS", "channel_units", "export_record", "refuse_what_is_no_export"]
 
 FORMATS = {"csv": ".csv", "mat": ".mat", "parquet": ".parquet"}
 """Formats and their suffixes."""
@@ -31,15 +33,27 @@ def channel_units(record: xr.Dataset) -> Iterator[tuple[str, str, Array]]:
             yield channel, channel_unit(channel, units) or "-", values
 
 
+def refuse_what_is_no_export(path: Path) -> None:
+    """Raise RecordError if a file is there that was not written by `export_record`: a laboratory's own data."""
+    if not path.exists():
+        return
+    with suppress(RecordError):
+        if all("layout_version" in raw.facts for raw in load_raw(path)):
+            return
+    raise RecordError(f"{path}: is there and is no earlier export; name another file with --out, or remove it first")
+
+
 def export_record(record: xr.Dataset, path: Path | str, form: str) -> None:
     """Write a record as `csv`, `mat` or `parquet`, whole or not at all; all three import again without a map.
 
     In a `.mat` file a column is a variable `platen_displacement_x_m`, as a MATLAB name can hold no brackets, and the
     attributes are the struct `facts`. Variables that are not along time are left out. Raises RecordError for a
-    dataset that is no record, UnknownNameError for another format.
+    dataset that is no record, or a file named as one of another format; UnknownNameError for another format.
     """
     if form not in FORMATS:
         raise UnknownNameError("format to export to", form, list(FORMATS))
+    if Path(path).suffix.lower() != FORMATS[form]:
+        raise RecordError(f"{path}: the name of a file of format {form} ends in {FORMATS[form]}")
     if faults := layout_faults(record):
         raise RecordError(f"{path}: cannot export what is no record: {faults[0]}")
     columns = {"time [s]": record["time"].values.astype(float)}

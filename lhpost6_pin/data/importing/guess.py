@@ -83,8 +83,7 @@ def guess_map(
     unknown: list[tuple[Source, str]] = []
     remarks: list[str] = []
     bare: dict[str, str] = {}
-    for raw, name, number in ((r, n, k) for r in raws for k, n in enumerate(r.names, 1)):
-        unit = raw.units[number - 1]
+    for raw, name, number, unit in ((r, *one) for r in raws for one in zip(r.names, r.numbers, r.units, strict=True)):
         channel, like = _channel(name, unit, machine)
         source = _source(raws, raw, name, number, unit)
         where = f"column {number} of {_file_name(raw)}"

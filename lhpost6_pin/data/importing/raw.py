@@ -16,7 +16,7 @@ class RawTest:
 
     `names` and `units` (k,) are as written in the file, a unit is None where the file gives none. `values` (n, k) are
     in those units, NaN where a sample is missing. `time` (n,) [s] is None where the file has none. `facts` are the
-    other attributes of the file.
+    other attributes of the file. `numbers` (k,) are the columns' places in the file from 1, a column of time counted.
     """
 
     source: str
@@ -26,6 +26,7 @@ class RawTest:
     values: Array
     time: Array | None
     facts: Mapping[str, str] = field(default_factory=dict)
+    numbers: tuple[int, ...] = ()
 
 
 def make_raw(
@@ -36,14 +37,20 @@ def make_raw(
     values: Array,
     time: Array | None,
     facts: Mapping[str, str] | None = None,
+    *,
+    numbers: Sequence[int] | None = None,
 ) -> RawTest:
-    """Make a `RawTest`; raises RecordError if there is no channel, or fewer than two samples."""
+    """Make a `RawTest`, its columns numbered as they come unless `numbers` (k,) are given.
+
+    Raises RecordError if there is no channel, or fewer than two samples.
+    """
     if not names:
         raise RecordError(f"{source}: holds no channel; a test needs at least one column beside time")
     if len(values) < 2:
         raise RecordError(f"{source}: holds {len(values)} sample(s); a test needs at least two")
     tidy = tuple(unit.strip() or None if unit else None for unit in units)
-    return RawTest(source, form, tuple(name.strip() for name in names), tidy, values, time, dict(facts or {}))
+    every = tuple(range(1, len(names) + 1) if numbers is None else numbers)
+    return RawTest(source, form, tuple(name.strip() for name in names), tidy, values, time, dict(facts or {}), every)
 
 
 def shown(names: Sequence[str], most: int = 12) -> str:
@@ -57,4 +64,4 @@ def need_package(name: str, job: str) -> None:
     try:
         import_module(name)
     except ModuleNotFoundError as error:
-        raise RecordError(f"{job} needs {name}: pip install 'lhpost6-pin[formats]'") from error
+        raise RecordError(f"{job} needs {name}: pip install {name}") from error

@@ -53,7 +53,7 @@ def export_fmu(machine: Machine, path: Path | str) -> None:
     try:
         from pythonfmu.builder import FmuBuilder
     except ImportError:
-        raise SimulationError("an FMU is made by pythonfmu: pip install 'lhpost6-pin[fmi]'") from None
+        raise SimulationError("an FMU is made by pythonfmu: pip install pythonfmu==0.7.0") from None
     with tempfile.TemporaryDirectory() as folder, write_whole(target) as beside, _own_imports():
         FmuBuilder.build_FMU(
             _PROGRAM,

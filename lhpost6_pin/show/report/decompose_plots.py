@@ -11,14 +11,15 @@ from ...identification.decompose import Decomposed, Work, WrenchAgreement
 from ...identification.decompose.dataset import delivered_by
 from .force_grid import SIX_ROWS, force_grid
 from .page import Block, Figure, details
-from .plots import ACHIEVED, TARGET, VERMILLION, Row, Trace, palette, palette_traces, time_figure
+from .plots import ACHIEVED, BLACK, TARGET, Row, Trace, palette, palette_traces, time_figure
 from .scales import ROTATIONS, SCALES, Scale, force_scale
 
 __all__ = ["component_figure", "effect_blocks", "moved_axes", "six_row_blocks", "work_figure"]
 
 
 ENERGY, POWER = Scale(1e-3, "kJ"), Scale(1e-3, "kW")
-RESIDUAL: dict[str, Any] = {"color": VERMILLION, "width": 1.0}
+RESIDUAL: dict[str, Any] = {"color": BLACK, "width": 1.0, "dash": "dot"}
+"""A style that no effect has."""
 POINTS = 2500  # of a curve in the six rows
 BUCKETS = 500  # stretches of a channel over time, each drawn by its least and greatest sample
 STILL = 0.01  # fraction of an axis's travel below which it counts as at rest

@@ -133,14 +133,18 @@ def residual_tables(found: Decomposed, agreement: WrenchAgreement) -> list[Table
         by, mean_by = (EXPLANATIONS[x[k]][0] for x in (agreement.varying_explained, agreement.offset_explained))
         varying.append((AXES[k], residual, noise, ratio, *expected, by))
         means.append((AXES[k], *(shown_as(float(x.offset[k]), scale) for x in levels), mean_by))
-    tail = ("Sensors", "Parameters", "Sufficient explanation")
+    tail, within = ("Sensors", "Parameters", "Sufficient explanation"), f"{number(agreement.coverage, 1)} of them"
     return [
         Table(
-            "Varying part of the residual: standard deviations over time",
+            f"Varying part of the residual: standard deviations over time (sufficient: within {within})",
             ("Axis", "Residual", "Noise", "Ratio", *tail),
             varying,
         ),
-        Table("Mean of the residual", ("Axis", "Residual", *tail), means),
+        Table(
+            f"Mean of the residual; one standard deviation of each (sufficient: within {within})",
+            ("Axis", "Residual", *tail),
+            means,
+        ),
     ]
 
 

@@ -2,7 +2,7 @@
 // Draws each figure when it scrolls into view; keeps all time axes on the same window; keys move and zoom a focused figure.
 (function () {
   const PRINT_WIDTH = 850; // CSS px of an A4 or Letter page between its margins, at the print zoom of page.css
-  const NARROW = 720; // CSS px below which legends stand under the row titles instead of beside them
+  const NARROW = 720; // CSS px below which legends always stand under the row titles instead of beside them
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   const plots = Array.from(document.querySelectorAll(".plot"));
   const visible = new Set();
@@ -39,16 +39,31 @@
     for (const plot of visible) applyWindow(plot);
   }
 
-  // On a narrow screen title and legend of a row do not fit side by side: make room above each row for both.
-  function stackTitles(width, layout, traces) {
+  const column = (names) => 52 + 6.5 * Math.max(...names); // CSS px: plotly's columns are as wide as the longest name
+
+  // Lengths of the names in each row's legend.
+  function legendNames(traces) {
     const entries = {};
     for (const t of traces) if (t.showlegend !== false) (entries[t.legend || "legend"] ||= []).push(t.name.length);
-    const lines = Math.max(0, ...Object.values(entries).map((names) => { // plotly stacks in columns as wide as the longest
-      const columns = Math.max(1, Math.floor((width - 75) / (52 + 6.5 * Math.max(...names))));
-      return Math.ceil(names.length / columns);
-    }));
-    layout.margin.b += 22; // the buttons stand below the axis title
-    const titles = layout.annotations.filter((a) => a.name === "title");
+    return entries;
+  }
+
+  const titlesOf = (layout) => layout.annotations.filter((a) => a.name === "title");
+
+  // Whether a row's title and its legend would overlap side by side.
+  function crowded(width, layout, traces) {
+    const entries = legendNames(traces);
+    return titlesOf(layout).some((title, k) => {
+      const names = entries[`legend${k ? k + 1 : ""}`] || [];
+      return names.length && 7.2 * title.text.length + names.length * column(names) > width - 75;
+    });
+  }
+
+  // Make room above each row for its title and, below that, its legend.
+  function stackTitles(width, layout, traces) {
+    const lines = Math.max(0, ...Object.values(legendNames(traces)).map((names) =>
+      Math.ceil(names.length / Math.max(1, Math.floor((width - 75) / column(names))))));
+    const titles = titlesOf(layout);
     const { row } = layout.meta, above = 22 + 19 * lines, bottom = layout.margin.b;
     const inner = titles.length * row + (titles.length - 1) * (above + 12);
     layout.height = inner + above + bottom;
@@ -79,11 +94,13 @@
       dragmode: coarse ? false : "zoom" };
     if (width) base.width = width;
     const room = width || plot.clientWidth;
-    if (room < NARROW) stackTitles(room, layout, traces);
+    const buttons = !plot.closest(".grid");
+    if (buttons) { layout.margin.b += 22; layout.height += 22; } // they stand below the axis title
+    if (room < NARROW || crowded(room, layout, traces)) stackTitles(room, layout, traces);
     plot.style.height = `${layout.height}px`;
     Plotly.newPlot(plot, traces, { ...base, ...layout }, {
       responsive: true, displaylogo: false, doubleClick: "reset+autosize",
-      displayModeBar: plot.closest(".grid") ? false : coarse || "hover",
+      displayModeBar: buttons && (coarse || "hover"),
       modeBarButtons: [plot.clientWidth < NARROW ? ["zoom2d", "pan2d", "resetScale2d"]
         : ["toImage", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"]],
       toImageButtonOptions: { filename: plot.id, scale: 2 },

@@ -8,7 +8,16 @@ from .control_blocks import assumed_in, load_of, numbers_used
 from .page import Block, Headline, Level, Page, Section, bullet_list, number, save_page
 from .scales import percent
 from .validate_machine import drift_blocks, lag_blocks, resonance_blocks, valve_blocks
-from .validate_sections import ROMAN, named, summary_blocks, test_blocks, why_not, worst_of
+from .validate_sections import (
+    ACTUATORS,
+    ROMAN,
+    named,
+    summary_blocks,
+    test_blocks,
+    why_not,
+    worst_in_words,
+    worst_of,
+)
 
 __all__ = ["validation_notes", "validation_verdict", "write_validate_report"]
 
@@ -62,13 +71,11 @@ def validation_verdict(found: Validation) -> tuple[str, Level]:
         if worst is None:
             sentences.append(f"{PHASES[n].capitalize()}: {why_not(found, n)}.")
             continue
-        phase, one = worst
-        where = f"{phase.test}, {one.column}, {named(one.quantity)}"
-        words = f"{PHASES[n].capitalize()}: largest RRMSE {percent(one.rrmse_aligned)} ({where})"
+        words = f"{PHASES[n].capitalize()}: {worst_in_words(found, n)}"
         spread = found.residual_over_noise if n == 1 else None
         residual = f"; residual {number(spread[0], 2)} to {number(spread[1], 2)} times the noise" if spread else ""
         sentences.append(f"{words}{residual}.")
-        level = level if one.rrmse_aligned <= FOLLOWED else "attention"
+        level = level if worst[1].rrmse_aligned <= FOLLOWED else "attention"
     if any("settings may differ" in words for p in found.phases for words in p.notes):
         sentences.append("The controller settings of the tests are unknown.")
     stopped = [p.test for p in found.phases if any("stopped at" in words for words in (*p.notes, p.reason or ""))]
@@ -86,6 +93,8 @@ def _headline(found: Validation, n: int) -> Headline:
     phase, one = worst
     note = f"{phase.test}, axis {one.column}, {named(one.quantity)}; {percent(one.rrmse)} including delay; "
     note += f"{number(one.error_to_noise, 2)} × noise"
+    if (single := worst_of(found, n, ACTUATORS)) is not None:
+        note += f". Single actuators: up to {percent(single[1].rrmse_aligned)} ({single[0].test}, {single[1].column})"
     return Headline(percent(one.rrmse_aligned), label, note, "good" if one.rrmse_aligned <= FOLLOWED else "attention")
 
 

@@ -10,7 +10,7 @@ from .page import Block, Markup, Table, details, number, paragraph, shaded, text
 from .scales import ROTATIONS, percent, shown_as
 from .validate_plots import actuator_blocks, force_figure, motion_blocks, scale_of, spectrum_blocks
 
-__all__ = ["ROMAN", "named", "summary_blocks", "test_blocks", "why_not", "worst_of"]
+__all__ = ["ROMAN", "named", "summary_blocks", "test_blocks", "why_not", "worst_in_words", "worst_of"]
 
 ROMAN = {1: "I", 2: "II", 3: "III"}
 SUMMED = {1: ("wrench",), 2: ("displacement", "acceleration", "wrench"), 3: ("displacement", "acceleration")}
@@ -38,10 +38,26 @@ def named(quantity: str) -> str:
     return _NAMES.get(quantity, quantity)
 
 
-def worst_of(found: Validation, phase: int) -> tuple[Phase, ColumnAgreement] | None:
-    """The largest error in the summary of a phase, among axes that moved; None without any."""
-    rows = ((p, a) for p in found.phases if p.number == phase for a in _judged(p))
+def worst_of(
+    found: Validation, phase: int, quantities: Sequence[str] | None = None
+) -> tuple[Phase, ColumnAgreement] | None:
+    """The largest error of a phase among columns that moved, of some quantities or those summed; None without any."""
+    rows = ((p, a) for p in found.phases if p.number == phase for a in _judged(p, quantities))
     return max(rows, key=lambda row: row[1].rrmse_aligned, default=None)
+
+
+def worst_in_words(found: Validation, phase: int) -> str:
+    """The largest RRMSE of a phase in words: of the platen's motion and total force, and of single actuators."""
+    worst, single = worst_of(found, phase), worst_of(found, phase, ACTUATORS)
+    if worst is None:
+        return why_not(found, phase)
+    kind = "total force" if phase == 1 else "the platen and its total force" if phase == 2 else "the platen"
+    words = f"largest RRMSE of {kind} {_placed(*worst)}"
+    return f"{words}, of a single actuator {_placed(*single)}" if single else words
+
+
+def _placed(phase: Phase, one: ColumnAgreement) -> str:
+    return f"{percent(one.rrmse_aligned)} ({phase.test}, {one.column}, {named(one.quantity)})"
 
 
 def why_not(found: Validation, phase: int) -> str:
@@ -52,8 +68,10 @@ def why_not(found: Validation, phase: int) -> str:
     return "omitted, see the notes" if reasons else "no axis moved enough"
 
 
-def _judged(phase: Phase) -> list[ColumnAgreement]:
-    return [a for a in phase.agreement if a.quantity in SUMMED[phase.number] and a.moves]
+def _judged(phase: Phase, quantities: Sequence[str] | None = None) -> list[ColumnAgreement]:
+    """Agreement of columns that moved, of some quantities or those that the summary sums."""
+    some = SUMMED[phase.number] if quantities is None else quantities
+    return [a for a in phase.agreement if a.quantity in some and a.moves]
 
 
 # --------------------------------------------------------------------------------------------- over all tests
@@ -80,8 +98,37 @@ def summary_blocks(found: Validation) -> list[Block]:
         for n, reasons in requested.items()
         if reasons and all(reasons)
     ]
-    heat = Table("RRMSE, delay removed", ("Phase and quantity", "Test", *axes), rows)
-    return [how, Markup(f"<p>{key}</p>"), heat, *skipped, *_spool_blocks(found), *_residual_blocks(found)]
+    heat = Table(
+        f"RRMSE, delay removed (▲ largest of a phase, ! above {NOISE:g} × noise)",
+        ("Phase and quantity", "Test", *axes),
+        rows,
+    )
+    more = (*_actuator_blocks(found), *_spool_blocks(found), *_residual_blocks(found))
+    return [how, Markup(f"<p>{key}</p>"), heat, *skipped, *more]
+
+
+def _actuator_blocks(found: Validation) -> list[Block]:
+    """The largest RRMSE of forces and pressures of single actuators, by phase and test."""
+    phases = [p for p in found.phases if any(_judged(p, (quantity,)) for quantity in ACTUATORS)]
+    if not phases:
+        return []
+    names = ((f"{ROMAN[p.number]} · {PHASES[p.number]}", p.test) for p in phases)
+    rows = [(*name, *(_single_cell(p, q) for q in ACTUATORS)) for name, p in zip(names, phases, strict=True)]
+    how = (
+        "Single actuators: the largest RRMSE, delay and means removed, over actuators whose force or pressure moved. "
+        "Ten actuators move six axes: forces by which they only act against each other move nothing, and a small error "
+        "of a spool position, a null or a length changes them by much. Total forces do not contain them."
+    )
+    return [how, Table("Largest RRMSE of a single actuator", ("Phase", "Test", *map(named, ACTUATORS)), rows)]
+
+
+def _single_cell(phase: Phase, quantity: str) -> Markup:
+    """The largest RRMSE of one quantity of all actuators, its actuator and its error over noise."""
+    worst = max(_judged(phase, (quantity,)), key=lambda a: a.rrmse_aligned, default=None)
+    if worst is None:
+        return text("")
+    shade = next(k for k, top in enumerate(_SHADES) if not worst.rrmse_aligned > top)
+    return shaded(f"{percent(worst.rrmse_aligned)} {worst.column}, {number(worst.error_to_noise, 2)} × noise", shade)
 
 
 def _spool_blocks(found: Validation) -> list[Block]:
@@ -108,17 +155,17 @@ def _residual_blocks(found: Validation) -> list[Block]:
     means: list[tuple[str, ...]] = [(test, *map(_mean_cell, own)) for test, own in tests.items()]
     sd = [a.offset_expected * scale_of("wrench", a.column).factor for a in next(iter(tests.values()))]
     means.append(("calibration, one sd", *(number(one, 2) for one in sd)))
-    units = [f"{column} [{scale_of('wrench', column).unit}]" for column in columns]
+    units, heads = [f"{column} [{scale_of('wrench', column).unit}]" for column in columns], ("Test", *columns)
     return [
         "Residual of inverse dynamics (required less measured actuator force, mean and delay removed) over its "
         f"predicted sensor noise. 1 is noise alone; ! marks more than {NOISE:g} (incomplete model) and less than "
         f"{1 / NOISE:g} (stated noise too large). The last row is that noise, one standard deviation. Gain errors of "
         "sensors add to the residual of moving axes.",
-        Table("Residual of inverse dynamics over the noise predicted", ("Test", *columns), ratios),
+        Table(f"Residual of inverse dynamics over the noise predicted (! beyond {NOISE:g} times)", heads, ratios),
         "Mean of required less measured force by inverse dynamics. The last row is its uncertainty from gains and "
         "offsets of the sensors of force (load cells, else pressures), one standard deviation; ! marks more than "
         f"{SENSED:g} of them: a weight, a pressure or a sensor is wrong.",
-        Table("Mean error of the total actuator force", ("Test", *units), means),
+        Table(f"Mean error of the total actuator force (! beyond {SENSED:g} deviations)", ("Test", *units), means),
     ]
 
 
@@ -175,10 +222,9 @@ def _shown_axes(phase: Phase) -> list[str]:
 
 
 def _short(phase: Phase) -> str:
-    worst = max(_judged(phase), key=lambda a: a.rrmse_aligned, default=None)
-    if worst is None:
-        return ", almost at rest"
-    return f", worst RRMSE {percent(worst.rrmse_aligned)} ({worst.column}, {named(worst.quantity)})"
+    rows = (max(_judged(phase, of), key=lambda a: a.rrmse_aligned, default=None) for of in (None, ACTUATORS))
+    words = [f"{percent(a.rrmse_aligned)} ({a.column}, {named(a.quantity)})" for a in rows if a is not None]
+    return f", largest RRMSE {' and '.join(words)}" if words else ", almost at rest"
 
 
 def _metrics(phase: Phase) -> Markup:

@@ -27,7 +27,8 @@ from lhpost6_pin.identification.validation.spectra import find_peak, find_valves
 from lhpost6_pin.mechanics.linearize import oil_column_modes
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
-from lhpost6_pin.show.report.validate_report import write_validate_report
+from lhpost6_pin.show.report.scales import percent
+from lhpost6_pin.show.report.validate_report import validation_verdict, write_validate_report
 from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.simulation.simulated_campaign import SensorErrors, as_sensed
 from lhpost6_pin.tuning.identify import noise_target
@@ -394,6 +395,16 @@ def test_the_report_has_the_figures_of_every_phase(found_noisy, tmp_path):
     assert len(figures) == len(re.findall(r'class="plot" id=', page))  # no name twice
     assert page.count("▲") >= 1 + len(PHASES)  # the key and the worst of each phase
     assert len(page) < 6e6
+
+
+def test_the_verdict_states_the_largest_error_of_a_single_actuator_too(found_noisy):
+    rows = [(p.test, a) for p in found_noisy.phases if p.number == 2 for a in p.agreement if a.moves]
+    single = [(t, a) for t, a in rows if a.quantity in ("actuator_force", "chamber_pressure_a", "chamber_pressure_b")]
+    test, worst = max(single, key=lambda row: row[1].rrmse_aligned)
+    total = max(a.rrmse_aligned for _, a in rows if a.quantity in ("displacement", "acceleration", "wrench"))
+    assert worst.rrmse_aligned > 2.0 * total  # forces of actuators against each other move nothing
+    words, _ = validation_verdict(found_noisy)
+    assert f"of a single actuator {percent(worst.rrmse_aligned)} ({test}, {worst.column}, " in words
 
 
 def test_the_command_leaves_report_and_metrics(lhpost6, coarse, tmp_path):

@@ -342,7 +342,7 @@ def test_the_governing_limit_comes_first_and_every_quantity_has_its_row(tmp_path
     assert uses["displacement", "y"].share == pytest.approx(moved / 0.38)
     assert "actuator velocity" in summary.headlines[2].note and "H4" in summary.headlines[2].note
     assert summary.headlines[2].level == "attention" and "within the given limits" in summary.verdict
-    rows = page.partition("<caption><span>Demand over capacity</span>")[2].partition("</table>")[0]
+    rows = page.partition("<caption><span>Demand over capacity, achieved</span>")[2].partition("</table>")[0]
     named = re.findall('<th scope="row">(.*?)</th>', rows)
     others = {"Displacement", "Velocity", "Acceleration", "Actuator stroke", "Spool"}
     assert named[0] == "Actuator velocity" and set(named[1:]) == others

@@ -35,8 +35,8 @@ LIMIT_NAMES = (
     "strut_area",  # (n_strut,) [m2]: gas pressure times area is the pull of a strut
 )
 
-_IN_RECORD = ("displacement", "velocity", "acceleration", "actuator stroke", "actuator velocity")
-_IN_RECORD += ("actuator push", "actuator pull")
+_OF_AXES = ("displacement", "velocity", "acceleration")
+_IN_RECORD = (*_OF_AXES, "actuator stroke", "actuator velocity", "actuator push", "actuator pull")
 """Demands of a motion that the channels of a record show."""
 
 

@@ -36,8 +36,9 @@ def response_blocks(record: xr.Dataset) -> list[Block]:
         rows, least = [], ROUND_OFF * np.nanmax(np.abs(values))
         for j, name in enumerate(INTERFACE_NAMES.values()):
             scale, k = (FORCE if j < 3 else MOMENT), int(np.nanargmax(np.abs(values[:, j])))
-            cells = (scaled_number(x if abs(x) > least else 0.0, scale) for x in (values[k, j], values[0, j]))
-            rows.append((name, scale.unit, *cells, f"{start + k * step:.3f} s"))
+            peak, at_rest = (x if abs(x) > least else 0.0 for x in (values[k, j], values[0, j]))
+            when = f"{start + k * step:.3f} s" if peak else "–"
+            rows.append((name, scale.unit, scaled_number(peak, scale), scaled_number(at_rest, scale), when))
         where = record["specimen_wrench"].attrs.get("interface", "")
         title = f"Wrench of the specimen on the platen at the interface, {where}, platen axes; weight included"
         blocks.append(Table(title, ("Component", "Unit", "Peak", "at rest", "Time of the peak"), rows))

@@ -1,6 +1,9 @@
 """Reports of the control tools: what they conclude from good and bad findings, complete, self-contained."""
 
+import json
+import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +16,7 @@ from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.show.report.charts import Curve, Panel, XAxis, chart_figure, matrix_figure
 from lhpost6_pin.show.report.iterate_plots import compare
-from lhpost6_pin.show.report.iterate_report import write_iterate_report
+from lhpost6_pin.show.report.iterate_report import target_demands, write_iterate_report
 from lhpost6_pin.show.report.scales import decibels, degrees
 from lhpost6_pin.show.report.sine_report import write_sine_report
 from lhpost6_pin.show.report.tune_report import write_tune_report
@@ -230,14 +233,98 @@ def test_a_sine_within_its_goals_is_good(tmp_path, sine):
     [
         ({"amplitude_error": -0.05}, "attention", "not within 1 %"),
         ({"phase_error": 0.1}, "attention", "5.73°, not within"),
-        ({"distortion": 1.0}, "attention", "does not fall"),
-        ({"distortion": np.nan}, "attention", "does not fall"),
+        ({"distortion": 1.0}, "bad", "rises from"),
+        ({"distortion": np.nan}, "attention", "is not judged"),
     ],
 )
 def test_a_sine_off_its_goals_says_which(tmp_path, sine, changes, level, said):
     page = write_sine_report(replace(sine, after=replace(sine.after, **changes)), tmp_path / "s.html")
     assert Reader(page).verdict[0] == level and said in Reader(page).verdict[1]
     assert not NO_NUMBER.search(Reader(page).words)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "level", "said"),
+    [
+        (0.2, 0.15, "attention", "falls from 20.0 % to 15.0 %, by less than half."),
+        (0.2, 0.3, "attention", "rises from 20.0 % to 30.0 %, by a factor of 1.50."),
+        (0.148, 1.05, "bad", "rises from 14.8 % to 105 %, by a factor of 7.09."),
+        (0.0, 0.1, "bad", "rises from 0 % to 10.0 %."),
+    ],
+)
+def test_the_verdict_on_a_sine_states_how_far_its_distortion_falls_or_rises(tmp_path, sine, before, after, level, said):
+    results = {name: replace(getattr(sine, name), distortion=d) for name, d in (("before", before), ("after", after))}
+    found = Reader(write_sine_report(replace(sine, **results), tmp_path / "s.html")).verdict
+    assert found[0] == level and f"The distortion of the acceleration {said}" in found[1].replace("\xa0", " ")
+
+
+def test_an_acceleration_far_above_its_target_is_in_the_verdict_of_a_sine(tmp_path, sine):
+    run = replace(sine.after.run, a=3.0 * sine.after.run.a)
+    level, verdict = Reader(
+        write_sine_report(replace(sine, after=replace(sine.after, run=run)), tmp_path / "s.html")
+    ).verdict
+    # a sine of 0.05 m at 1 Hz has 0.05 (2 pi)^2 m/s2 = 0.2013 g
+    found = re.search(r"The acceleration reaches ([\d.]+).g for a target of ([\d.]+).g\.", verdict)
+    assert level == "bad" and float(found[2]) == pytest.approx(0.2013, rel=0.01)
+    assert float(found[1]) == pytest.approx(3 * 0.2013, rel=0.05)  # with its distortion
+    assert "The acceleration reaches" not in Reader(write_sine_report(sine, tmp_path / "s.html")).verdict[1]
+
+
+LOOP = {"loop_summary": "The control loop is what it is", "loop_remedy": "lhpost6 tune --x"}
+
+
+@pytest.mark.parametrize(("loop", "level"), [("stable", "good"), ("thin", "attention"), ("unstable", "bad")])
+def test_the_verdicts_of_a_sine_and_an_iteration_begin_with_a_loop_that_is_not_stable(
+    tmp_path, sine, iterated, loop, level
+):
+    facts = {"loop": loop, **LOOP}
+    for page in (
+        write_sine_report(sine, tmp_path / "s.html", loop=facts),
+        write_iterate_report(iterated, tmp_path / "i.html", loop=facts),
+    ):
+        found = Reader(page).verdict
+        assert found[0] == level
+        start = "The control loop is what it is (mend it by “lhpost6 tune --x”). "
+        assert found[1].startswith(start) == (loop != "stable")
+
+
+def test_growing_errors_of_an_unstable_loop_are_not_blamed_on_the_cancellers(tmp_path, sine):
+    growing = np.exp(0.2 * np.arange(len(sine.after.run.a)) / 2048)[:, None]
+    run = replace(sine.after.run, a=sine.after.run.a * growing)
+    test = replace(sine, after=replace(sine.after, run=run))
+    verdict = Reader(write_sine_report(test, tmp_path / "s.html", loop={"loop": "unstable", **LOOP})).verdict[1]
+    assert "grows from cycle to cycle." in verdict and "cancellers are unstable" not in verdict
+
+
+@pytest.mark.parametrize("command", ["sine", "iterate"])
+def test_the_commands_state_an_unstable_loop_on_their_page_and_in_their_result(
+    lhpost6, tmp_path, monkeypatch, sine, iterated, command
+):
+    unstable = SimpleNamespace(verdict="unstable", summary="The control loop is unstable, it is said", falls=False)
+    monkeypatch.setattr("lhpost6_pin.cli.control.checked_loop", lambda *_, **__: unstable)
+    monkeypatch.setattr("lhpost6_pin.tuning.sine.sine_test", lambda *_, **__: sine)
+    monkeypatch.setattr("lhpost6_pin.tuning.iterate.iterate", lambda *_, **__: iterated)
+    options = ("--amplitude", "0.05") if command == "sine" else ("white-noise", "--scale", "0.1", "--set", "duration=6")
+    ended = lhpost6(command, *options, "--machine", "uniaxial", "--out", tmp_path, "--json")
+    entries = json.loads(ended.out)
+    assert (entries["loop"], entries["loop_summary"]) == ("unstable", unstable.summary)
+    assert entries["loop_remedy"] == "lhpost6 tune --machine uniaxial"
+    level, verdict = Reader(tmp_path / "report.html").verdict
+    assert level == "bad" and verdict.startswith("The control loop is unstable, it is said (mend it by")
+
+
+def test_the_iteration_shows_the_demand_of_its_target_in_the_units_of_a_run(iterated, tmp_path):
+    table = target_demands(iterated)
+    assert table.caption == "Demand over capacity, target; actuator forces beyond rest"
+    peaks = {row[0]: row[2].replace("\xa0", " ") for row in table.rows}
+    wanted = np.abs(iterated.target.displacement[:, 0]).max()
+    # of the one actuator along x its stroke is the displacement
+    assert peaks["Displacement"] == peaks["Actuator stroke"] == f"{1e3 * wanted:#.3g} mm"
+    assert all(re.fullmatch(r"[\d.]+ (mm|m/s|g|MN)", peak) for peak in peaks.values()), peaks
+    assert {"Actuator velocity", "Actuator push", "Actuator pull", "Axis force"} <= set(peaks)
+    words = Reader(write_iterate_report(iterated, tmp_path / "i.html")).words
+    assert "The quantity of the drive is acceleration" in words
+    assert "Fraction of the axis's motion explained linearly by the reference;" in words
 
 
 def test_errors_too_small_to_matter_are_rounded_with_their_sign(tmp_path, sine):

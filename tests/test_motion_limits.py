@@ -253,13 +253,14 @@ def test_an_empty_chamber_is_stated_before_the_stop_that_follows_it():
     assert trouble.startswith(f"became unphysical at {run.time[empty.argmax()]:.4f} s: chamber A of V")
 
 
-def test_a_simulated_test_of_a_campaign_that_is_not_physical_says_so_in_its_record():
+def test_a_simulated_test_of_a_campaign_that_is_not_physical_says_so_in_its_record(caplog):
     machine, sensors = load_machine().with_specimen("block_4_9MN", (4.0, 1.5, 0.0)), load_sensors("lhpost6")
     settings = load_controller("cautious")
     for scale, sound in ((0.1, True), (3.0, False)):
         made = simulate_campaign(machine, settings, sensors, seed=0, tests=("WN",), scale=scale)
         trouble = made.records[0].attrs["trouble"]
         assert trouble == "none" if sound else "chamber A of V6 fell below zero pressure" in trouble
+    assert any(message.startswith("WN: the run became unphysical at ") for message in caplog.messages)
 
 
 def test_voids_that_take_too_little_of_the_stiffness_do_not_excuse_a_chamber_below_zero():

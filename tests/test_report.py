@@ -25,6 +25,7 @@ from lhpost6_pin.show.report.page import Page, Section, Table, bar, number, pack
 from lhpost6_pin.show.report.plots import ACHIEVED, Row, Trace, envelope, time_figure
 from lhpost6_pin.show.report.run_report import RunSummary, lead_summary, write_run_report
 from lhpost6_pin.show.report.scales import SCALES, Scale, percent, scaled_number, shown_as
+from lhpost6_pin.show.report.specimen_section import response_blocks
 from lhpost6_pin.show.terminal import _rich
 from lhpost6_pin.tuning.interaction import Cut, Interaction
 
@@ -302,6 +303,18 @@ def test_the_verdict_leads_with_clipped_spools(tmp_path):
     assert clean.level == "good"
 
 
+def test_components_of_a_wrench_that_are_round_off_beside_the_largest_are_shown_as_zero():
+    """A block of 4.9 MN pulled along x: what a run leaves of y and roll, and of x at rest."""
+    wrench = np.zeros((100, 6))
+    wrench[:, 0], wrench[:, 1], wrench[:, 2] = np.linspace(1e-13, 1e5, 100), 2.4e-8, -4.9e6
+    wrench[:, 3], wrench[:, 4] = 2.7e-7, 1.0  # 1 N m is small, but no round-off
+    record = xr.Dataset({"specimen_wrench": (("time", "interface_axis"), wrench)}, {"time": np.arange(100) / 512})
+    rows = {row[0]: row[2:] for row in response_blocks(record)[0].rows}
+    assert rows["base shear x"] == ("100", "0", "0.193 s") and rows["base shear y"] == ("0", "0", "–")
+    assert rows["overturning about x"] == rows["torsion"] == ("0", "0", "–")
+    assert rows["overturning about y"][:2] == ("0.00100", "0.00100")
+
+
 @pytest.mark.parametrize(("loop", "level"), [("stable", "good"), ("thin", "attention"), ("unstable", "bad")])
 def test_the_verdict_names_a_loop_without_margin_and_its_remedy(tmp_path, loop, level):
     record = make_record()
@@ -342,7 +355,7 @@ def test_the_governing_limit_comes_first_and_every_quantity_has_its_row(tmp_path
     assert uses["displacement", "y"].share == pytest.approx(moved / 0.38)
     assert "actuator velocity" in summary.headlines[2].note and "H4" in summary.headlines[2].note
     assert summary.headlines[2].level == "attention" and "within the given limits" in summary.verdict
-    rows = page.partition("<caption><span>Demand over capacity</span>")[2].partition("</table>")[0]
+    rows = page.partition("<caption><span>Demand over capacity, achieved</span>")[2].partition("</table>")[0]
     named = re.findall('<th scope="row">(.*?)</th>', rows)
     others = {"Displacement", "Velocity", "Acceleration", "Actuator stroke", "Spool"}
     assert named[0] == "Actuator velocity" and set(named[1:]) == others

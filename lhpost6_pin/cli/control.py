@@ -11,7 +11,7 @@ from ..core.names import AXES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import completing
-from .loop_check import checked_loop, interaction_of, loop_facts
+from .loop_check import LOOP_FACTS, checked_loop, interaction_of, loop_facts
 from .motion_options import MotionOptions
 from .rehearse import save_run
 from .results_folder import RUN_FILES
@@ -74,15 +74,16 @@ def iterate(
     target = motion.target(table, beyond)
     name = target.reference.motion.replace("/", "_")
     folder = opt.folder_for(out, f"{name}_iterated", "drive.nc", "inverse.nc", "report.html")
-    checked_loop(table, settings, machine)
+    loop = loop_facts(checked_loop(table, settings, machine), machine)
     with progress_bar(f"iterating {name} on {table.name}") as progress:
         result = iterate_drive(table, target, settings, most=most, gain=gain, progress=progress)
     facts = circumstances(table, settings.name)
     files = [folder / name for name in ("drive.nc", "inverse.nc", "report.html")]
     save_drive(result.drive, settings.mode, target, files[0], {**facts, "iteration": result.best})
     save_inverse(replace(result.table.inverse, made_with=facts), files[1])
-    write_iterate_report(result, files[2], command=repeating_command())
-    print_result(json, lambda: iteration_entries(result), lambda: print_iterations(result), files)
+    write_iterate_report(result, files[2], command=repeating_command(), loop=loop)
+    entries = {key: loop.get(key) for key in LOOP_FACTS}
+    print_result(json, lambda: iteration_entries(result) | entries, lambda: print_iterations(result), files)
 
 
 @command()
@@ -152,12 +153,13 @@ def sine(
     json: opt.Json = False,
 ) -> None:
     """Run a sine without and with amplitude-phase control and harmonic cancellation; writes report.html."""
+    from ..core.rounding import rounded_down
     from ..mechanics.plant import make_plant
     from ..show.report.sine_report import write_sine_report
     from ..show.result_tables import print_sine
     from ..show.results import sine_entries
     from ..simulation.motion_limits import check_motion_limits
-    from ..tuning.sine import axis_row, default_amplitude, rounded_down, sine_target, sine_test
+    from ..tuning.sine import axis_row, default_amplitude, sine_target, sine_test
 
     table = machine.load(valves)
     plant = make_plant(table)
@@ -172,8 +174,9 @@ def sine(
             fits = rounded_down(amplitude * (error.largest_scale or 0.0), 3)
             hint = f". The largest --amplitude that fits is {fits:g}" if fits else ""
             raise OutOfRangeError(f"{error}{hint}", error.largest_scale, error.exceeded) from None
-    checked_loop(table, settings, machine)
+    loop = loop_facts(checked_loop(table, settings, machine), machine)
     with progress_bar(f"sine in {axis} on {table.name}") as progress:
         found = sine_test(table, settings, axis=axis, amplitude=amplitude, frequency=frequency, progress=progress)
-    report = write_sine_report(found, folder / "report.html", command=repeating_command())
-    print_result(json, lambda: sine_entries(found), lambda: print_sine(found), [report])
+    report = write_sine_report(found, folder / "report.html", command=repeating_command(), loop=loop)
+    entries = {key: loop.get(key) for key in LOOP_FACTS}
+    print_result(json, lambda: sine_entries(found) | entries, lambda: print_sine(found), [report])

@@ -160,6 +160,7 @@ def campaign(
     sensors: opt.SensorsName = None,
     tests: Annotated[str | None, typer.Option(help="Tests of the campaign, such as TX,WN; default: all.")] = None,
     scale: Annotated[float, typer.Option(help="Scale factor of all motions, e.g. for a smaller table.")] = 1.0,
+    beyond: opt.Beyond = False,
     errors: Annotated[bool, typer.Option(help="Draw random gains, offsets and skews of the sensors.")] = True,
     seed: Annotated[int, typer.Option(min=0, help="Seed of sensor noise and sensor errors.")] = 0,
     json: opt.Json = False,
@@ -169,7 +170,7 @@ def campaign(
     from ..data.sensors import load_sensors
     from ..data.summary import summarise_records
     from ..show.check_tables import campaign_entries, print_tests
-    from ..simulation.simulated_campaign import simulate_campaign
+    from ..simulation.simulated_campaign import check_campaign, simulate_campaign
 
     table = machine.load()
     named = sensors or table.sensors
@@ -182,13 +183,16 @@ def campaign(
     folder = opt.folder_for(out, "campaign")
     if any(folder.glob("*.nc")):
         raise ParameterError(f"--out {folder}: holds records already, which would count as tests; name another folder")
+    if not beyond:
+        check_campaign(table, tests=chosen, scale=scale)
+    facts = loop_facts(checked_loop(table, settings, machine), machine)
     name = folder.resolve().name
+    options: dict[str, Any] = {"seed": seed, "errors": errors, "tests": chosen, "scale": scale, "name": name}
     with progress_bar(f"a campaign on {table.name}") as progress:
-        made = simulate_campaign(
-            table, settings, known, seed=seed, errors=errors, tests=chosen, scale=scale, name=name, progress=progress
-        )
+        made = simulate_campaign(table, settings, known, attrs=facts, progress=progress, **options)
     files, summaries = save_campaign(made, folder), summarise_records(made.records)
     entries = {"campaign": name, "tests": [one.test for one in summaries], **campaign_entries(summaries)}
+    entries |= {key: facts.get(key) for key in LOOP_FACTS}
     print_result(json, lambda: entries, lambda: print_tests(summaries), files)
 
 

@@ -46,8 +46,8 @@ def make_motion_check(plant: Plant) -> MotionCheck:
         moved, rate = legs[:, : plant.spools], rate[:, : plant.spools]
         fed = np.where(rate >= 0.0, rate / speeds[:, 0], -rate / speeds[:, 1])
         found = [
-            Demand("actuator velocity", names, fed, of_speed if reserve else OF_SPEED),
-            Demand("actuator stroke", names, np.abs(moved) / strokes, "of its stroke"),
+            Demand("actuator velocity", names, fed, of_speed if reserve else OF_SPEED, rate),
+            Demand("actuator stroke", names, np.abs(moved) / strokes, "of its stroke", moved),
         ]
         needed = required_forces(plant, PlatenMotion(displacement, velocity, acceleration), legs)
         beyond, at = needed.share - rest.share, rest.share[0]

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from decimal import ROUND_DOWN, Context
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from ..core.errors import OutOfRangeError
+from ..core.rounding import rounded_down
 from .motion import AXES
 from .process import Target
 
@@ -48,7 +48,7 @@ class Demand(NamedTuple):
     share: np.ndarray  # (n, m) demand over capacity, signed or not; above 1 it exceeds the capacity
     of: str  # what the capacity is, after "37 %"
     value: np.ndarray | None = None  # (n, m) demand in SI
-    unit: str = ""  # of `value`
+    unit: str = ""  # of `value`, where a peak states it in words
     decides: bool = True  # whether a motion beyond it is refused
 
 
@@ -76,7 +76,7 @@ class Peak(NamedTuple):
     sample: int
     text: str  # value against limit
     decides: bool = True
-    value: float | None = None  # demand in SI, where it is more than a share
+    value: float | None = None  # demand in SI, where it is known
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ def peak_of_demand(demand: Demand) -> list[Peak]:
         sample = int(np.argmax(shares[:, i]))
         share = float(shares[sample, i])
         text = f"{100 * share:.4g} % {demand.of}" if np.isfinite(share) else f"infinitely many times {demand.of}"
-        if demand.value is not None:
+        if demand.value is not None and demand.unit:
             text = f"{abs(demand.value[sample, i]):.4g} {demand.unit}, {text}"
         value = None if demand.value is None else float(demand.value[sample, i])
         peaks.append(Peak(demand.quantity, name, share, sample, text, demand.decides, value))
@@ -209,7 +209,7 @@ def _axis_peaks(target: Motion, limits: MotionLimits) -> list[Peak]:
             value, limit = abs(float(values[sample, i])), float(bounds[sample])
             unit = ("m" if i < 3 else "rad") + per
             text = f"{value:.4g} {unit} against {limit:.4g} {unit}"
-            peaks.append(Peak(quantity, axis, value / limit, sample, text))
+            peaks.append(Peak(quantity, axis, value / limit, sample, text, value=value))
     return peaks
 
 
@@ -232,4 +232,4 @@ def _deciding(motion: Motion, check: MotionCheck, factor: float, some: np.ndarra
 
 def _round_down(value: float) -> float:
     """Three significant digits, never above `value` by more than rounding."""
-    return float(Context(prec=3, rounding=ROUND_DOWN).create_decimal(value * _FULL))
+    return rounded_down(value * _FULL, 3)

@@ -16,7 +16,7 @@ from ..motions import Peak
 
 __all__ = ["LIMIT_NAMES", "TOLERANCE", "ForceUse", "LimitUse", "Limits", "checked_limits", "force_use"]
 __all__ += ["governing_limits", "limit_uses", "plant_limits", "sample_shares", "share_of_limit", "shares_of_limit"]
-__all__ += ["uses_of_peaks"]
+__all__ += ["all_uses_of_peaks", "uses_of_peaks"]
 
 Limits = Mapping[str, Array]
 
@@ -35,7 +35,8 @@ LIMIT_NAMES = (
     "strut_area",  # (n_strut,) [m2]: gas pressure times area is the pull of a strut
 )
 
-_IN_RECORD = ("actuator push", "actuator pull")
+_OF_AXES = ("displacement", "velocity", "acceleration")
+_IN_RECORD = (*_OF_AXES, "actuator stroke", "actuator velocity", "actuator push", "actuator pull")
 """Demands of a motion that the channels of a record show."""
 
 
@@ -152,10 +153,15 @@ def limit_uses(
 
 def uses_of_peaks(peaks: Iterable[Peak]) -> list[LimitUse]:
     """Return the demands of a motion on forces and strengths, of those that no channel of a record shows."""
+    return all_uses_of_peaks(peak for peak in peaks if peak.quantity not in _IN_RECORD)
+
+
+def all_uses_of_peaks(peaks: Iterable[Peak]) -> list[LimitUse]:
+    """Return the demands of a motion on all limits, as far as they are known in SI."""
     return [
         LimitUse(peak.quantity, peak.name, abs(peak.value), peak.utilisation, peak.decides)
         for peak in peaks
-        if peak.value is not None and peak.quantity not in _IN_RECORD
+        if peak.value is not None
     ]
 
 

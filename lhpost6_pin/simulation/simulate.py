@@ -89,11 +89,12 @@ def simulate(
     watch: Watch | None = None,
     coupling: CouplingOptions | None = None,
     stop: Callable[[], bool] | None = None,
+    label: str = "",
 ) -> Run:
     """Run `samples` controller samples and return the motion, every `record_every`-th sample.
 
     `watch` is called 32 times per second of the run, first at its start, and `stop` as often: True ends the run there.
-    `coupling`: how a coupled specimen is.
+    `coupling`: how a coupled specimen is. `label`: name of the run, with which its warnings begin.
 
     Raises UnknownNameError or SimulationError for an invalid scheme, engine, rate, loop or exchange. A run that stops
     early does not raise: see `Run.trouble`.
@@ -128,10 +129,12 @@ def simulate(
         trouble = diverged or diagnosis(
             plant, status, done / SAMPLE_RATE, scheme, steps_per_second, replayed=not closed
         )
+    named = f"{label}: " if label else ""
     if trouble:
-        log.warning(trouble)
+        log.warning("%s%s", named, trouble)
     if clipped:
-        log.warning("%d spool values beyond full stroke were clipped to it: the motion needs more flow", clipped)
+        what = "spool values beyond full stroke were clipped to it: the motion needs more flow"
+        log.warning("%s%d %s", named, clipped, what)
     motion = {name: values[:kept] for name, values in log_._asdict().items()}
     if exchanged is not None:
         exchanged = exchanged.every(record_every, kept)

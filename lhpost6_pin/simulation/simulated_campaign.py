@@ -5,7 +5,8 @@ with skew, gain and offset, low-pass, noise and resolution. The true errors are 
 calibration does not read.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,10 +14,11 @@ import xarray as xr
 
 from ..control import ControllerSettings, controlled
 from ..core.arrays import Array
-from ..core.errors import SimulationError, UnknownNameError
+from ..core.errors import OutOfRangeError, SimulationError, UnknownNameError
 from ..core.files import models_folder
 from ..core.names import SAMPLE_RATE
 from ..core.progress import Progress
+from ..core.rounding import rounded_down
 from ..data.accelerometers import with_platen_acceleration
 from ..data.campaign import Campaign
 from ..data.channels import LAYOUT, sensor_groups
@@ -24,13 +26,16 @@ from ..data.sensors import SensorSet, add_noise
 from ..data.signals import align
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters, load_parameters
+from ..mechanics.plant import make_plant
 from ..mechanics.pose import PlatenMotion
 from ..motions import Target, find_motion, make_target
+from .motion_limits import check_motion_limits
 from .outputs import record_of_run
 from .simulate import ClosedLoop, fastest_engine, simulate
 from .trouble import with_pressure_trouble
 
-__all__ = ["SensorErrors", "as_sensed", "draw_errors", "load_procedure", "simulate_campaign", "tests_of"]
+__all__ = ["SensorErrors", "as_sensed", "check_campaign", "draw_errors", "load_procedure", "simulate_campaign"]
+__all__ += ["tests_of"]
 
 AT_REST = 1e-3
 """Share of a target's largest velocity up to which it counts as at rest."""
@@ -44,6 +49,33 @@ class SensorErrors(NamedTuple):
     delay: Mapping[str, float]
 
 
+def check_campaign(
+    machine: Machine, *, tests: Sequence[str] | None = None, scale: float = 1.0, procedure: str = "campaign"
+) -> None:
+    """Compare the tests of a procedure (or some of them) with the limits of the machine, each as far as it is run.
+
+    Raises OutOfRangeError that names every test beyond them with the limits exceeded, and the largest scale of the
+    campaign, three digits, with which all of its tests fit; UnknownNameError as `simulate_campaign`.
+    """
+    numbers, plant = load_procedure(procedure), make_plant(machine)
+    clauses: list[str] = []
+    exceeded: list[str] = []
+    fits = float("inf")
+    for test in _chosen(numbers, tests):
+        try:
+            check_motion_limits(plant, _as_run(numbers, test, _target(numbers, test, machine, scale)))
+        except OutOfRangeError as error:
+            if not error.largest_scale:  # no scale mends it: held axes, a specimen that is not borne at rest
+                raise
+            clauses.append(f"{test}: {error}")
+            exceeded += [quantity for quantity in error.exceeded if quantity not in exceeded]
+            fits = min(fits, error.largest_scale / _own_scale(numbers, test))
+    if clauses:
+        fits = rounded_down((1.0 + 1e-9) * fits, 3)  # a quotient of three digits each is exact but for rounding
+        every = f"The largest scale of the campaign with which all of these tests fit is {fits:g}"
+        raise OutOfRangeError(". ".join([*clauses, every]), fits, tuple(exceeded))
+
+
 def simulate_campaign(
     machine: Machine,
     settings: ControllerSettings,
@@ -55,32 +87,30 @@ def simulate_campaign(
     tests: tuple[str, ...] | None = None,
     name: str = "simulated",
     procedure: str = "campaign",
+    attrs: Mapping[str, Any] | None = None,
     progress: Progress | None = None,
 ) -> Campaign:
     """Rehearse the tests of a procedure of `models/procedures` (or some of them), recorded through the sensors.
 
     scale is a factor on all motions; errors draws calibration errors within the ranges of the sensors, the same for all
-    tests. Deterministic for a seed.
+    tests; attrs are added to those of every record. Deterministic for a seed. Tests beyond the limits of the machine
+    are run, too (`check_campaign`).
 
     A test that becomes unphysical is a warning, and `trouble` of its record. Raises SimulationError if one stops early,
     UnknownNameError for a test that the file does not have.
     """
     numbers = load_procedure(procedure)
     rng = np.random.default_rng(seed)
-    known = tests_of(numbers)
-    chosen = tests or known
-    for test in chosen:
-        if test not in known:
-            raise UnknownNameError("test of a campaign", test, known)
+    chosen = _chosen(numbers, tests)
     plant, rest, controller = controlled(machine, settings)
     drawn: SensorErrors | None = None
     records = []
     for i, test in enumerate(chosen):
         target = _target(numbers, test, machine, scale)
-        samples = min(len(target.time), round(numbers.number(f"{test}.seconds") * SAMPLE_RATE))
-        motion = PlatenMotion(*(x[:samples] for x in (target.displacement, target.velocity, target.acceleration)))
+        kept = _as_run(numbers, test, target)
+        samples, motion = len(kept.time), PlatenMotion(kept.displacement, kept.velocity, kept.acceleration)
         loop = ClosedLoop(controller, controller.drive_for(*motion), rest)
-        run = simulate(plant, loop, samples=samples, engine=fastest_engine(plant))
+        run = simulate(plant, loop, samples=samples, engine=fastest_engine(plant), label=test)
         if run.trouble:
             raise SimulationError(f"{test}: {run.trouble}")
         facts = {
@@ -88,10 +118,11 @@ def simulate_campaign(
             "title": f"{name}, {test}",
             "controller": settings.name,
             "motion": str(numbers.words[f"{test}.motion"]),
+            **(attrs or {}),
         }
         if samples < len(target.time) and _moves(target, samples - 1):
             facts["cut"] = f"ends in motion: the first {samples / SAMPLE_RATE:g} s of {target.time[-1]:.3g} s"
-        record = record_of_run(with_pressure_trouble(run), facts, motion)
+        record = record_of_run(with_pressure_trouble(run, test), facts, motion)
         if machine.accelerometers:  # they are what is measured
             record = record.drop_vars("platen_acceleration")
         if drawn is None:
@@ -101,6 +132,27 @@ def simulate_campaign(
         if progress is not None:
             progress((i + 1) / len(chosen))
     return Campaign(name, tuple(records))
+
+
+def _chosen(numbers: Parameters, tests: Sequence[str] | None) -> Sequence[str]:
+    """The tests, all of the procedure by default; raises UnknownNameError for one that it does not have."""
+    known = tests_of(numbers)
+    for test in tests or ():
+        if test not in known:
+            raise UnknownNameError("test of a campaign", test, known)
+    return tests or known
+
+
+def _as_run(numbers: Parameters, test: str, target: Target) -> Target:
+    """The part of a test's target that is run."""
+    n = min(len(target.time), round(numbers.number(f"{test}.seconds") * SAMPLE_RATE))
+    rows = {name: getattr(target, name)[:n] for name in ("time", "displacement", "velocity", "acceleration")}
+    return replace(target, **rows)
+
+
+def _own_scale(numbers: Parameters, test: str) -> float:
+    """Scale of a test's motion in a campaign of scale 1."""
+    return numbers.number(f"{test}.scale") if f"{test}.scale" in numbers else 1.0
 
 
 def _moves(target: Target, sample: int) -> bool:
@@ -128,7 +180,7 @@ def _target(numbers: Parameters, test: str, machine: Machine, factor: float) -> 
             word = numbers.words.get(path)
             options[key] = numbers.number(path) if word is None else bool(word) if isinstance(word, int) else word
     motion = find_motion(str(numbers.words[f"{test}.motion"]), **options)
-    scale = factor * (numbers.number(f"{test}.scale") if f"{test}.scale" in numbers else 1.0)
+    scale = factor * _own_scale(numbers, test)
     own = None if machine.motion == "free" else machine.motion
     if own and motion.axes and not set(own) & set(motion.axes):  # held by the guides: move a free one
         own = f"{own[0]}={motion.axes[0]}"

@@ -52,19 +52,21 @@ class _Low(NamedTuple):
     least: float  # [Pa]
 
 
-def with_pressure_trouble(run: Run) -> Run:
+def with_pressure_trouble(run: Run, label: str = "") -> Run:
     """The run, with its `pressure_trouble`, which is logged; it stands before trouble that the run has already.
 
-    Pressures of a run that its scheme made diverge say nothing; such a run may not have stopped.
+    label: name of the run, with which the warning begins. Pressures of a run that its scheme made diverge say nothing;
+    such a run may not have stopped.
     """
     first = None if run.diverged else _first_empty(run)
     if first is None:
         return run
+    named = f"{label}: the run" if label else "the run"
     if run.trouble is None and (why := scheme_divergence(run.plant, run.scheme, run.steps_per_second, first.time)):
-        log.warning("the run %s", why)
+        log.warning("%s %s", named, why)
         return replace(run, trouble=why, diverged=True)
     trouble = _unphysical(first.chamber, first.time)
-    log.warning("the run %s", trouble)
+    log.warning("%s %s", named, trouble)
     return replace(run, trouble=trouble if run.trouble is None else f"{trouble}; then: {run.trouble}")
 
 

@@ -11,7 +11,6 @@ amplitude and phase (APC); the others cancel the harmonics due to friction, valv
 """
 
 from dataclasses import dataclass
-from decimal import ROUND_DOWN, Context
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..core.names import AXES, SAMPLE_RATE
 from ..core.progress import Progress
+from ..core.rounding import rounded_down
 from ..core.shown import Shown
 from ..data.distortion import Harmonics, harmonics, phase_between, total_harmonic_distortion
 from ..machine.machine import Machine
@@ -40,7 +40,6 @@ __all__ = [
     "SineTest",
     "axis_row",
     "default_amplitude",
-    "rounded_down",
     "sine_target",
     "sine_test",
     "with_cancellers",
@@ -144,11 +143,6 @@ def default_amplitude(plant: Plant, axis: str, frequency: float) -> float:
     stated = plant.machine.limits.displacement[AXES.index(axis)]
     fits = stated * fitting_scale(plant, sine_target(axis, stated, frequency)[0])
     return rounded_down(share * fits, 2)
-
-
-def rounded_down(value: float, digits: int) -> float:
-    """A positive value with a number of significant digits, never above it."""
-    return float(Context(prec=digits, rounding=ROUND_DOWN).create_decimal(value))
 
 
 def sine_test(

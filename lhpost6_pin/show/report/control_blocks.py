@@ -1,6 +1,7 @@
 """Blocks shared by reports: machine and load, controller settings, assumptions, numbers used."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,8 @@ from ...tuning.identify import tuning_numbers
 from .page import Block, Table, bullet_list, details, number
 from .plots import palette
 
-__all__ = ["AXIS_LINES", "DEFAULTS", "assumed_in", "assumption_blocks", "gain_table", "load_of", "numbers_used"]
+__all__ = ["AXIS_LINES", "DEFAULTS", "assumed_in", "assumption_blocks", "gain_table", "load_of", "loop_sentence"]
+__all__ += ["numbers_used"]
 
 AXIS_LINES = dict(zip(AXES, palette(len(AXES)), strict=True))
 """Line style of each axis in plots of several."""
@@ -24,6 +26,18 @@ def load_of(machine: Machine) -> str:
     """Return the machine and its load as text."""
     specimen = machine.specimen
     return f"{machine.name}, {f'specimen {specimen.name}' if specimen else 'bare table'}"
+
+
+def loop_sentence(facts: Mapping[str, Any]) -> tuple[str, bool]:
+    """Return the sentence on a control loop that is not stable, or thinly, empty for others; and if it is unstable.
+
+    facts: the attributes `loop`, `loop_summary` and `loop_remedy` of a record, as far as they are known.
+    """
+    loop = str(facts.get("loop", "stable"))
+    if loop == "stable":
+        return "", False
+    remedy = f" (mend it by “{facts['loop_remedy']}”)" if "loop_remedy" in facts else ""
+    return f"{facts.get('loop_summary', f'The control loop is {loop}')}{remedy}.", loop == "unstable"
 
 
 def _gains_of(settings: ControllerSettings) -> dict[str, tuple[float, ...]]:

@@ -136,7 +136,7 @@ def spectrum_blocks(found: Sequence[AxisIteration]) -> list[Block]:
 def drive_blocks(result: Iterated, found: Sequence[AxisIteration]) -> list[Block]:
     """Return the best drive over the reference, in the quantity of the controller's mode."""
     mode = result.settings.mode
-    how = f"The drive is a {mode}, the mode of the reference generator; the reference is the drive of iteration 0."
+    how = f"The quantity of the drive is {mode}, the mode of the reference generator; iteration 0 is the reference."
     drawings = []
     for one in found:
         k, scale = AXES.index(one.axis), axis_scale(one.axis, mode)
@@ -168,14 +168,16 @@ def table_blocks(table: TableInverse) -> list[Block]:
     matrix = matrix_figure("table", title, words, transfer.axes, f, decibels, AFTER, span)
     coherent = [Curve(axis, f, transfer.coherence[inside, k], AXIS_LINES[axis]) for k, axis in enumerate(transfer.axes)]
     panels = [Panel("Multiple coherence", coherent, span=(0.0, 1.05))]
+    several = len(transfer.axes) > 1
     how = (
-        "Fraction of each axis's motion explained linearly by all six references; the inverse is faded out where it "
+        f"Fraction of {'each' if several else 'the'} axis's motion explained linearly by "
+        f"{f'the {len(transfer.axes)} references' if several else 'the reference'}; the inverse is faded out where it "
         "falls from 0.8 to 0.4."
     )
     over, marks = frequency_axis(*MATRIX), [_judged_to()]
     return [
         matrix,
-        chart_figure("coherence", "Coherence of every axis", how, panels, over, row_height=210, marks=marks),
+        chart_figure("coherence", "Coherence", how, panels, over, row_height=210, marks=marks),
     ]
 
 

@@ -1,7 +1,8 @@
 """The report of a drive iteration: the error of every iteration, and the best drive."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from ...simulation.motion_limits import judge_motion
 from ...tuning.identify import tuning_numbers
 from ...tuning.iterate import Iterated, Iteration
 from .charts import Curve, Panel, XAxis, chart_figure
-from .control_blocks import AXIS_LINES, assumption_blocks, load_of
+from .control_blocks import AXIS_LINES, assumption_blocks, load_of, loop_sentence
 from .iterate_plots import compare, drive_blocks, motion_blocks, spectrum_blocks, table_blocks
 from .page import Block, Figure, Headline, Level, Page, Section, Table, details, number, save_page
 from .run_limits import demand_table
@@ -27,9 +28,14 @@ REMAINING = 0.5
 NUMBERS = ("noise.rms", "noise.rotation_radius", "noise.low", "noise.high", "noise.segment", "iteration")
 
 
-def write_iterate_report(result: Iterated, path: Path | str, command: str = "") -> Path:
-    """Write the self-contained HTML report of an iteration to `path` and return the path."""
-    verdict, level = _verdict(result)
+def write_iterate_report(
+    result: Iterated, path: Path | str, command: str = "", loop: Mapping[str, Any] | None = None
+) -> Path:
+    """Write the self-contained HTML report of an iteration to `path` and return the path.
+
+    loop: stability of the control loop, see `loop_sentence`.
+    """
+    verdict, level = _verdict(result, loop or {})
     reference, machine = result.target.reference, result.first_run.plant.machine
     high = tuning_numbers().number("iteration.high")
     found = compare(result, high)
@@ -70,7 +76,7 @@ def _by_axis(result: Iterated, iteration: Iteration, quantity: str = "accelerati
     return {axis: float(getattr(iteration, quantity)[AXES.index(axis)]) for axis in _moved(result)}
 
 
-def _verdict(result: Iterated) -> tuple[str, Level]:
+def _verdict(result: Iterated, loop: Mapping[str, Any]) -> tuple[str, Level]:
     best = result.history[result.best]
     errors, before = _by_axis(result, best), _by_axis(result, result.history[0])
     large = [axis for axis, error in errors.items() if not error <= REACHED]
@@ -85,10 +91,14 @@ def _verdict(result: Iterated) -> tuple[str, Level]:
     ]
     if result.best == 0:
         words.insert(0, "No iteration improved on the reference as drive.")
+    unsteady, unstable = loop_sentence(loop)
+    if unsteady:
+        words.insert(0, unsteady)
     if best.clipped:
         words.append(f"{best.clipped} spool commands of the best drive were clipped at their limit.")
+    if best.clipped or unstable:
         return " ".join(words), "bad"
-    return " ".join(words), "attention" if large or little or result.best == 0 else "good"
+    return " ".join(words), "attention" if large or little or result.best == 0 or unsteady else "good"
 
 
 def _headlines(result: Iterated) -> list[Headline]:
@@ -158,7 +168,7 @@ def iteration_tables(result: Iterated) -> list[Table]:
 
 
 def target_demands(result: Iterated) -> Table | str:
-    """Return the demand of the target on every limit of the table, or why there is none."""
+    """Return the demand of the target (not of the achieved motion) on every limit, or why there is none."""
     target = result.target
     motion = PlatenMotion(target.displacement, target.velocity, target.acceleration)
     try:

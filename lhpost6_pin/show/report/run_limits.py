@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from ...motions import Peak
-from ...simulation.limit_use import TOLERANCE, LimitUse, governing_limits
+from ...simulation.limit_use import TOLERANCE, LimitUse, all_uses_of_peaks, governing_limits
 from .page import Block, Table, bar, number
 from .scales import SCALES, axis_scale, shown_as
 
@@ -14,6 +14,7 @@ SHOWN |= {"actuator unloading": "force", "reaction mass strength": "force", "pla
 SHOWN |= {"piston tilt": "rotation", "axis force": "force", "payload": "force", "axis overturning moment": "moment"}
 SHOWN |= {"reaction mass moment": "moment"}
 SHOWN |= {"axis yaw moment": "moment"}
+SHOWN |= {"actuator push": "force", "actuator pull": "force"}
 SHOWN |= {"push": "force", "pull": "force", "force": "force", "spool": "ratio"}
 
 
@@ -42,23 +43,15 @@ def limit_blocks(uses: Sequence[LimitUse]) -> list[Block]:
 
 
 def demand_table(peaks: Iterable[Peak]) -> Table:
-    """Return the largest demand of a motion on each quantity in words, the governing one first."""
-    most: dict[str, Peak] = {}
-    for peak in peaks:
-        if peak.quantity not in most or peak.utilisation > most[peak.quantity].utilisation:
-            most[peak.quantity] = peak
-    rows = [
-        (peak.quantity.capitalize(), peak.name, peak.text, bar(peak.utilisation, TOLERANCE))
-        for peak in sorted(most.values(), key=lambda peak: -peak.utilisation)
-    ]
-    return Table("Demand over capacity", ("Limit", "Governing", "Peak", "Demand / capacity"), rows)
+    """Return the largest demand of a target on each quantity, the governing one first, as `limit_table`."""
+    return limit_table(all_uses_of_peaks(peaks), "Demand over capacity, target; actuator forces beyond rest")
 
 
-def limit_table(uses: Sequence[LimitUse]) -> Table:
+def limit_table(uses: Sequence[LimitUse], title: str = "Demand over capacity, achieved") -> Table:
     """Return the largest demand over capacity of each quantity, the governing limit first."""
     rows = []
     for use in governing_limits(uses):
         scale = SCALES[SHOWN[use.quantity]] if use.quantity in SHOWN else axis_scale(use.name, use.quantity)
         peak = f"{number(use.peak, 3)} of the stroke" if use.quantity == "spool" else shown_as(use.peak, scale)
         rows.append((use.quantity.capitalize(), use.name, peak, bar(use.share, TOLERANCE)))
-    return Table("Demand over capacity", ("Limit", "Governing", "Peak", "Demand / capacity"), rows)
+    return Table(title, ("Limit", "Governing", "Peak", "Demand / capacity"), rows)

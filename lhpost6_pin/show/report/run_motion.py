@@ -10,7 +10,7 @@ from ...data.metrics import QUANTITIES, Tracking, channel, commanded_axes, drift
 from .page import Block, Figure, Table, details, missing, number
 from .plots import ACHIEVED, RECORDED, TARGET, Row, Trace, palette_traces, time_figure
 from .run_components import draw_over_time
-from .scales import SCALES, axis_scale, axis_title, late_or_ahead, percent
+from .scales import SCALES, axis_scale, axis_title, late_or_ahead, percent, scaled_number
 
 __all__ = ["drift_blocks", "tracking_blocks"]
 
@@ -63,7 +63,7 @@ def drift_blocks(record: xr.Dataset) -> list[Block]:
         rows += [Row(title, palette_traces([axes[k] for k in own], slow[:, own]), SCALES[kind])] if own else []
     words = f"Achieved minus target displacement below {number(cutoff, 2)} Hz (zero-phase low-pass)."
     summary = [
-        (axis, scale.unit, number(largest * scale.factor), number(last * scale.factor))
+        (axis, scale.unit, scaled_number(largest, scale), scaled_number(last, scale))
         for axis, scale, largest, last in zip(axes, scales, peaks(slow), offset, strict=True)
     ]
     header = ("Axis", "Unit", "Largest slow error", "Offset at the end")

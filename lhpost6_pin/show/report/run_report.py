@@ -32,7 +32,7 @@ from .run_oil import oil_blocks
 from .run_spectra import spectrum_blocks
 from .run_spools import spool_blocks
 from .run_verdict import headlines, verdict_of_run
-from .scales import axis_scale, milliseconds, percent, shown_as
+from .scales import axis_scale, milliseconds, percent, scaled_number, shown_as
 from .specimen_section import response_blocks
 
 __all__ = ["RunSummary", "lead_summary", "machine_blocks", "metrics_table", "write_run_report"]
@@ -199,7 +199,7 @@ def metrics_table(found: Sequence[Tracking], uses: Sequence[LimitUse]) -> Table:
     shares, rows = {(use.quantity, use.name): use.share for use in uses}, []
     for row in found:
         scale, used = axis_scale(row.axis, row.quantity), shares.get((row.quantity, row.axis), np.nan)
-        peaks = (number(peak * scale.factor) for peak in (row.peak_target, row.peak_achieved))
+        peaks = (scaled_number(peak, scale) for peak in (row.peak_target, row.peak_achieved))
         late = milliseconds(row.delay) if np.isfinite(row.delay) else "–"
         errors = percent(row.rrmse), late, percent(row.rrmse_aligned)
         rows.append((f"{row.axis} {row.quantity}", scale.unit, *peaks, bar(used, TOLERANCE), *errors))

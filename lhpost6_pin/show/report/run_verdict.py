@@ -8,6 +8,7 @@ import xarray as xr
 from ...data.metrics import SpoolUse, Tracking, channel, labels
 from ...simulation.divergence import recorded_divergence
 from ...simulation.limit_use import TOLERANCE, LimitUse, governing_limits
+from .control_blocks import loop_sentence
 from .page import Headline, Level, number
 from .run_limits import only_spools
 from .scales import SCALES, axis_scale, late_or_ahead, percent, shown_as
@@ -28,7 +29,7 @@ def verdict_of_run(
 ) -> tuple[str, Level]:
     """Return the verdict and its level: clipped spools, tracking, limits, control loop, notes."""
     stopped = str(record.attrs.get("trouble", "none")).partition(";")[0]
-    clipped, loop, unstable = _clipped(record, spools), *_loop(record)
+    clipped, loop, unstable = _clipped(record, spools), *loop_sentence(record.attrs)
     if stopped != "none":  # the part before the stop does not represent the test
         clipped = "" if recorded_divergence(record.attrs) else clipped
         sentences = [f"The run {stopped}: tracking is not judged.", clipped, loop, "See the notes."]
@@ -95,15 +96,6 @@ def _clipped(record: xr.Dataset, spools: Sequence[SpoolUse]) -> str:
         return ""
     start = f"{count} spool commands were clipped" if count else "Spools reached their full stroke"
     return f"{start}: {', '.join(full)}." if full else f"{start}."
-
-
-def _loop(record: xr.Dataset) -> tuple[str, bool]:
-    """The sentence on a control loop that is not stable, or thinly, empty for others; and whether it is unstable."""
-    loop = str(record.attrs.get("loop", "stable"))
-    if loop == "stable":
-        return "", False
-    remedy = f" (mend it by “{record.attrs['loop_remedy']}”)" if "loop_remedy" in record.attrs else ""
-    return f"{record.attrs.get('loop_summary', f'The control loop is {loop}')}{remedy}.", loop == "unstable"
 
 
 def _worst_rrmse(found: Sequence[Tracking]) -> Headline:

@@ -1,12 +1,14 @@
 """The report of a sine test: amplitude, phase and distortion without and with the cancellers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from ...core.names import AXES
 from ...tuning.sine import SineResult, SineTest
-from .control_blocks import assumption_blocks, load_of
+from .control_blocks import assumption_blocks, load_of, loop_sentence
 from .page import Headline, Level, Page, Section, Table, number, save_page
 from .scales import axis_scale, percent, shown_as, signed
 from .sine_plots import (
@@ -26,15 +28,22 @@ AMPLITUDE = 0.01
 PHASE = np.radians(2.0)
 GROWN = 1.05  # RMS error of the last measured cycle over the first from which it counts as growing
 DISTORTION_LEFT = 0.5  # share of the total harmonic distortion without cancellers
+DISTORTION_RISEN = 2.0  # the same, from which a test with cancellers is bad
+SHAKEN = 2.0  # peak acceleration achieved over that of the target, from which the verdict states both
 
 
-def write_sine_report(test: SineTest, path: Path | str, command: str = "") -> Path:
-    """Write the self-contained HTML report of a sine test to `path` and return the path."""
+def write_sine_report(
+    test: SineTest, path: Path | str, command: str = "", loop: Mapping[str, Any] | None = None
+) -> Path:
+    """Write the self-contained HTML report of a sine test to `path` and return the path.
+
+    loop: stability of the control loop, see `loop_sentence`.
+    """
     machine = test.before.run.plant.machine
     amplitude = shown_as(test.amplitude, axis_scale(test.axis, "displacement"))
     time = test.target.time[test.measured]
     cycles = round((time[-1] - time[0]) * test.frequency)
-    verdict, level = _verdict(test)
+    verdict, level = _verdict(test, loop or {})
     numbers = assumption_blocks(machine, ("sine", "feedforward_targets.high"))
     page = Page(
         kind="Sine report · simulated",
@@ -67,25 +76,30 @@ def _reached(test: SineTest) -> tuple[bool, bool, bool]:
     return abs(after.amplitude_error) <= AMPLITUDE, bool(abs(after.phase_error) <= PHASE), halved
 
 
-def _verdict(test: SineTest) -> tuple[str, Level]:
+def _verdict(test: SineTest, loop: Mapping[str, Any]) -> tuple[str, Level]:
     after, before = test.after, test.before
     amplitude, phase, halved = _reached(test)
-    falls = (
-        f"The distortion of the acceleration falls from {percent(before.distortion)} to {percent(after.distortion)}"
-        if after.distortion < before.distortion
-        else f"The distortion of the acceleration does not fall: {percent(before.distortion)} without, "
-        f"{percent(after.distortion)} with them"
-    )
+    unsteady, unstable = loop_sentence(loop)
+    change, much = _change_of_distortion(test)
     words = [
         f"With the cancellers the amplitude error is {_share(after.amplitude_error)} and the phase error "
         f"{_angle(after.phase_error)}, {'within' if amplitude and phase else 'not within'} {100 * AMPLITUDE:g} % and "
         f"{np.degrees(PHASE):g}°.",
-        f"{falls}, by {'half or more' if halved else 'less than half'}.",
+        change,
     ]
-    level: Level = "good" if amplitude and phase and halved else "attention"
+    reached = amplitude and phase and halved and not unsteady
+    level: Level = "bad" if unstable or much else "good" if reached else "attention"
+    if unsteady:
+        words.insert(0, unsteady)
+    wanted = float(np.abs(test.target.acceleration[test.measured, AXES.index(test.axis)]).max())
+    if (peak := _peak(test, after)) > SHAKEN * wanted:
+        scale = axis_scale(test.axis, "acceleration")
+        words.append(f"The acceleration reaches {shown_as(peak, scale)} for a target of {shown_as(wanted, scale)}.")
+        level = "bad"
     _, rms = error_per_cycle(motion_error(test, after)[test.measured], test.frequency)
     if len(rms) > 1 and rms[-1] > GROWN * rms[0]:
-        words.append("The error with the cancellers grows from cycle to cycle: the cancellers are unstable here.")
+        cause = "" if unstable else ": the cancellers are unstable here"
+        words.append(f"The error with the cancellers grows from cycle to cycle{cause}.")
         level = "bad"
     counts = {"without": before.run.clipped, "with": after.run.clipped}
     if any(counts.values()):
@@ -93,6 +107,19 @@ def _verdict(test: SineTest) -> tuple[str, Level]:
         words.append(f"The valves saturate: spool commands clipped at their limit, {clipped}.")
         level = "bad"
     return " ".join(words), level
+
+
+def _change_of_distortion(test: SineTest) -> tuple[str, bool]:
+    """The sentence on the distortion of the acceleration without and with cancellers; whether it rises by much."""
+    before, after = test.before.distortion, test.after.distortion
+    what, halved = "The distortion of the acceleration", _reached(test)[2]
+    if not np.isfinite([before, after]).all():
+        return f"{what} is not judged: {percent(before)} without, {percent(after)} with them.", False
+    if after < before:
+        by = "half or more" if halved else "less than half"
+        return f"{what} falls from {percent(before)} to {percent(after)}, by {by}.", False
+    by = f", by a factor of {number(after / before)}" if before > 0.0 else ""
+    return f"{what} rises from {percent(before)} to {percent(after)}{by}.", after > DISTORTION_RISEN * before
 
 
 def _headlines(test: SineTest) -> list[Headline]:
@@ -115,6 +142,7 @@ def sine_table(test: SineTest) -> Table:
         "Phase error of the displacement": lambda r: _angle(r.phase_error),
         "THD of the acceleration": lambda r: percent(r.distortion),
         "THD of the displacement": lambda r: percent_of_fundamental(100.0 * r.distortion_displacement),
+        "Peak acceleration, cycles measured": lambda r: shown_as(_peak(test, r), axis_scale(test.axis, "acceleration")),
         "Largest acceleration error, cycles measured": lambda r: _largest(test, r, test.measured),
         "Largest acceleration error, fading out": lambda r: _largest(test, r, fading),
         "Largest spool command": lambda r: percent(r.peak_spool),
@@ -123,6 +151,12 @@ def sine_table(test: SineTest) -> Table:
     rows = [(name, shown(test.before), shown(test.after)) for name, shown in quantities.items()]
     caption = "Amplitude and phase of the fundamental, THD = √(Σ harmonics²) ∕ fundamental"
     return Table(caption, ("", "Controller alone", "With APC and AHC"), rows)
+
+
+def _peak(test: SineTest, found: SineResult) -> float:
+    """Largest acceleration achieved on the axis of the sine in the cycles measured [m/s2, rad/s2]."""
+    achieved = motion_error(test, found) + test.target.acceleration[:, AXES.index(test.axis)]
+    return float(np.abs(achieved[test.measured]).max())
 
 
 def _largest(test: SineTest, found: SineResult, part: slice) -> str:

@@ -8,7 +8,7 @@ from ...mechanics.interface_wrench import INTERFACE_AXES
 from .page import Block, Table, number
 from .plots import Row, Trace, palette
 from .run_components import draw_over_time, specimen_blocks
-from .scales import Scale
+from .scales import Scale, scaled_number
 from .specimen_points import point_blocks
 
 __all__ = ["FORCE", "INTERFACE_NAMES", "MOMENT", "response_blocks"]
@@ -21,6 +21,9 @@ INTERFACE_NAMES = dict(
     )
 )
 """Components of the interface wrench in words."""
+ROUND_OFF = 1e-12
+"""Share of the largest component of a wrench [N, N m] up to which another is shown as 0: with the shipped specimens
+round-off of components that are zero by symmetry stays below a tenth of it."""
 FORCE, MOMENT = Scale(1e-3, "kN"), Scale(1e-3, "kN m")
 
 
@@ -30,11 +33,12 @@ def response_blocks(record: xr.Dataset) -> list[Block]:
     if "specimen_wrench" in record:
         values = channel(record, "specimen_wrench")
         start, step = sampling(record)
-        rows = []
+        rows, least = [], ROUND_OFF * np.nanmax(np.abs(values))
         for j, name in enumerate(INTERFACE_NAMES.values()):
             scale, k = (FORCE if j < 3 else MOMENT), int(np.nanargmax(np.abs(values[:, j])))
-            cells = (number(x * scale.factor) for x in (values[k, j], values[0, j]))
-            rows.append((name, scale.unit, *cells, f"{start + k * step:.3f} s"))
+            peak, at_rest = (x if abs(x) > least else 0.0 for x in (values[k, j], values[0, j]))
+            when = f"{start + k * step:.3f} s" if peak else "–"
+            rows.append((name, scale.unit, scaled_number(peak, scale), scaled_number(at_rest, scale), when))
         where = record["specimen_wrench"].attrs.get("interface", "")
         title = f"Wrench of the specimen on the platen at the interface, {where}, platen axes; weight included"
         blocks.append(Table(title, ("Component", "Unit", "Peak", "at rest", "Time of the peak"), rows))

@@ -1,7 +1,8 @@
 """A record as the bytes of a netCDF-4 file, in memory: HDF5 that meets a full disk crashes the process when it closes.
 
 Numbers and labels are written by h5netcdf itself: `Dataset.to_netcdf` first imports all of Dask, where it is installed,
-to see whether it has any part in the dataset.
+to see whether it has any part in the dataset. That takes longer than all else of writing a record; without Dask both
+are as fast.
 """
 
 import io

@@ -369,6 +369,8 @@ def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
         )
         await tab.key("Escape")
         await wait(tab, "document.body.classList.contains('tripped')")
+        sections = "[...document.querySelectorAll('section')].filter((box) => box.scrollWidth > box.clientWidth)"
+        assert await tab.evaluate(f"{sections}.map((box) => box.textContent)") == []  # nothing beyond its box
         await press(tab, "reset")
         await wait(tab, "!document.body.classList.contains('tripped')")
         await press(tab, "record")

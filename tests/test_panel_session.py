@@ -211,3 +211,11 @@ def test_another_operator_runs_only_what_his_page_states(panel):
     panel.session.look()
     assert said == ["another program is loaded meanwhile: sine 0.5 Hz; choose again"]
     assert panel.state.state == "stopped"
+
+
+def test_a_browser_that_leaves_just_after_run_stops_the_program(panel):
+    panel.load(SINE)
+    panel.take({"do": "run"})
+    panel.session.leave(panel.anna)  # before the session knows that it runs
+    panel.session.look()
+    assert panel.state.state == "stopping"

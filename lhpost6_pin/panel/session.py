@@ -109,8 +109,8 @@ class Session:
         self.choice.cancel()
         running = self.status is not None and self.status.state in ("running", "holding")
         self.journal.note(client.name, "left the panel" + (" in mid-run: the program is stopped" if running else ""))
-        if running:
-            self._control.order({"do": "stop", "by": client.number, "who": client.name, "what": ""})
+        if self.status is not None:  # also of a program that has been run since
+            self._send(client, {"do": "stop", "what": ""})
 
     def role(self, client: Client) -> str:
         """Role of a client."""

@@ -1,5 +1,6 @@
 """A table that is driven by hand: moves, programs, the drive, interlocks and the controller, without processes."""
 
+import re
 import threading
 import time
 
@@ -7,26 +8,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from panel_table import Table
 
 from lhpost6_pin.control import load_controller
-from lhpost6_pin.control.plug import Feedback
 from lhpost6_pin.core.errors import ControllerError, LhpostError, MotionError, OutOfRangeError
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.interfaces.link import (
-    Datagram,
-    Kind,
     LinkClient,
     LinkMode,
     PlantState,
-    Reading,
     ServedPlant,
-    decode,
-    encode,
     open_socket,
     serve,
 )
-from lhpost6_pin.interfaces.link.protocol import MOTION
-from lhpost6_pin.mechanics.coupled import motion_of_numbers
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
@@ -36,7 +30,7 @@ from lhpost6_pin.panel.engine import BLOCK, Engine, Status
 from lhpost6_pin.panel.moves import Moved, at_rest, move_to
 from lhpost6_pin.panel.orders import Orders
 from lhpost6_pin.panel.programs import Recorded, make_wave
-from lhpost6_pin.panel.recording import Recording, record_of_rows
+from lhpost6_pin.panel.recording import record_of_rows
 from lhpost6_pin.panel.ring import ROWS, Ring, RingReader
 from lhpost6_pin.panel.rows import Rows
 from lhpost6_pin.panel.timekeeping import Timekeeping
@@ -240,47 +234,6 @@ def test_a_setpoint_is_approached_at_the_stated_share_of_the_velocity_limits():
 
 
 # --------------------------------------------------------------------------------------------- the controller
-class Table:
-    """A served plant and the controller of a panel, joined by datagrams in one process."""
-
-    def __init__(self, machine):
-        self.plant = make_plant(machine)
-        rest = find_equilibrium(self.plant)
-        self.rows = Rows(len(machine.actuators), len(machine.struts))
-        self.engine = Engine(self.plant, rest, load_controller("lhpost6"), NUMBERS, self.rows)
-        self.served = ServedPlant(self.plant, rest, LinkMode.REAL_TIME)
-        self.n, self.sequence = len(machine.actuators), 0
-        self.recording = Recording("test")
-        self.reading = self._read(self.served.receive(encode(Datagram(Kind.HELLO, 7)), "here", 0)[-1])
-        self.engine.answer(self.reading)
-
-    def _read(self, datagram):
-        frame, n = decode(datagram), self.n
-        sensors = Feedback(frame.numbers[6 : 6 + n], frame.numbers[:6], frame.numbers[6 + n : 6 + 2 * n])
-        motion = motion_of_numbers(frame.numbers[-MOTION:])
-        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, motion)
-
-    def do(self, do, program=None, **more):
-        self.engine.order({"do": do, **more}, program)
-
-    def step(self, seconds=1.0 / SAMPLE_RATE):
-        for _ in range(round(seconds * SAMPLE_RATE)):
-            command = self.engine.answer(self.reading)
-            self.recording.add(self.engine.row[None].copy())
-            if command is not None:
-                self.sequence += 1
-                counts = self.served._valves
-                head = {"actuators": self.n, "valves": int(counts.sum()), "sequence": self.sequence}
-                frame = Datagram(Kind.COMMAND, 7, **head, numbers=np.repeat(command, counts))
-                self.served.receive(encode(frame), "here", 0)
-            if (datagram := self.served.tick(0)) is None:
-                return
-            self.reading = self._read(datagram)
-
-    def of(self, name):
-        return self.rows.of(self.recording.rows(), name)
-
-
 @pytest.fixture
 def table(machine):
     found = Table(machine)
@@ -454,6 +407,42 @@ def test_a_program_beyond_the_table_is_refused_before_it_runs(machine):
         check_program(plant, sine(frequency=3.0), gain, np.zeros(6))
 
 
+def test_a_motion_is_loaded_at_its_own_scale_and_runs_by_its_number_alone(table):
+    table.do("scale", value=1.0)
+    table.do("load", recorded(), number=3, scale=0.2)
+    with pytest.raises(ControllerError, match="another program is loaded meanwhile: burst"):
+        table.do("run", number=2)
+    table.do("run", number=3)
+    table.step(0.2)
+    assert table.engine.status.scale == 0.2 and table.engine.status.number == 3
+    table.step(6.0)
+    peak = 0.2 * np.abs(recorded().displacement[:, 0]).max()  # taken between samples: (pi 1.5 / 2048)^2 / 2 of it
+    assert np.abs(table.of("reference_displacement")[:, 0]).max() == pytest.approx(peak, rel=1e-5)
+    table.do("unload")
+    assert table.engine.status.program is None and table.engine.status.number == 0
+    with pytest.raises(ControllerError, match="no program"):
+        table.do("run")
+
+
+def test_the_platen_is_parked_or_raised_at_every_pressure(machine):
+    low, high = Table(machine, parked=True), Table(machine)
+    assert (low.engine.status.platen, high.engine.status.platen) == ("parked", "raised")
+    low.do("pressure", to="high")
+    assert low.engine.status.platen == "parked"
+    low.step(1.0)
+    low.do("raise")
+    low.step(0.5)
+    assert low.engine.status.platen == "moving"
+    low.step(6.0)
+    assert low.engine.status.platen == "raised"
+    low.do("park")
+    low.step(7.0)
+    assert low.engine.status.platen == "parked"
+    low.do("pressure", to="low")
+    low.step(5.0)  # a hold in which it sinks a little
+    assert low.engine.status.platen == "parked"
+
+
 # --------------------------------------------------------------------------------------------- rows
 @pytest.mark.fast
 def test_a_ring_hands_over_every_row_once_and_counts_those_that_it_loses(tmp_path):
@@ -529,7 +518,8 @@ def orders(machine, tmp_path_factory):
 @settings(max_examples=200, deadline=None)
 def test_whatever_a_browser_sends_is_an_order_or_refused(orders, do, message, status):
     try:
-        order = orders.of(do, message, status)
+        chosen = do == "generator"
+        order = orders.choose({"do": do, **message}, status, 1)[0] if chosen else orders.of(do, message, status)
     except (LhpostError, KeyError, TypeError, ValueError):  # what `Session.take` answers with a refusal
         return
     assert order["do"] in (do, "load") and isinstance(order["what"], str)
@@ -537,13 +527,64 @@ def test_whatever_a_browser_sends_is_an_order_or_refused(orders, do, message, st
         assert order["axis"] in range(6) and np.isfinite(order["value"])
 
 
+def motion(name: str, scale: float, **more) -> dict:
+    return {"do": "motion", "name": name, "scale": scale, **more}
+
+
 def test_a_motion_by_name_is_written_for_the_controller(orders):
-    order = orders.of("motion", {"name": "ridgecrest", "scale": 0.3, "axes": "xy"}, STATUS)
+    order, program = orders.choose(motion("ridgecrest-ccc", 0.3, axes="xy"), STATUS, 1)
     rows = np.load(order["file"], mmap_mode="r")
     assert rows.shape[::2] == (3, 6) and rows[0, :, :2].any() and not rows[0, :, 2:].any()
-    with pytest.raises(OutOfRangeError, match="exceeds"):
-        orders.of("motion", {"name": "ridgecrest", "scale": 3.0}, STATUS)
+    assert (order["do"], order["number"], order["scale"], program.name) == ("load", 1, 0.3, "ridgecrest-ccc")
+    with pytest.raises(OutOfRangeError, match="ridgecrest-ccc at scale 3 exceeds") as caught:
+        orders.choose(motion("ridgecrest-ccc", 3.0), STATUS, 2)
+    orders.choose(
+        motion("ridgecrest-ccc", caught.value.largest_scale), STATUS, 3
+    )  # as of the field, not of what it holds
     with pytest.raises(LhpostError, match="no ground motion named"):
-        orders.of("motion", {"name": "../secret.csv", "scale": 1.0}, STATUS)
+        orders.choose(motion("../secret.csv", 1.0), STATUS, 4)
     with pytest.raises(ControllerError, match="pressure is off"):
-        orders.of("motion", {"name": "ridgecrest", "scale": 1.0}, None)
+        orders.choose(motion("ridgecrest-ccc", 1.0), None, 5)
+
+
+def test_messages_are_in_the_units_of_the_fields(orders):
+    """Limits of the report's Table 2.2: 0.89 m of x, 2.22 deg of roll."""
+    for do, axis, value, why in (
+        ("span", "roll", np.radians(20.0), "span of roll: 20 deg; the limit is 2.22 deg"),
+        ("span", "x", 2.0, "span of x: 2000 mm; the limit is 890 mm"),
+        ("setpoint", "z", 0.5, "setpoint of z: 500 mm; the limit is 127 mm"),
+    ):
+        with pytest.raises(ControllerError, match=f"^{why}$"):
+            orders.of(do, {"axis": axis, "value": value}, STATUS)
+    assert orders.of("span", {"axis": "x", "value": 0.1}, STATUS)["what"] == "sets the span of x to 100 mm"
+    turned = orders.of("setpoint", {"axis": "yaw", "value": np.radians(-1.5)}, STATUS)
+    assert turned["what"] == "sets the setpoint of yaw to -1.5 deg"
+
+
+def test_a_refusal_for_capacity_is_in_the_units_of_the_page(machine):
+    plant, gain = make_plant(machine), np.array([0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    with pytest.raises(OutOfRangeError, match=r"x displacement 1000 mm against 890 mm at") as caught:
+        check_program(plant, sine(), gain, np.array([0.7, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    for frequency in (3.0, 8.0):
+        with pytest.raises(OutOfRangeError, match=r"acceleration [\d.]+ g against [\d.]+ g") as caught:
+            check_program(plant, sine(frequency=frequency), 3.0 * gain, np.zeros(6))
+        assert not re.search(r"\d (m|rad|rad/s|m/s\^2|rad/s\^2|N|N m)\b(?![/^])", str(caught.value)), caught.value
+
+
+@pytest.mark.parametrize(
+    "name, axis, share, words",
+    [
+        # 5 % of 0.89 m, of 2.22 deg, and a hundredth of the acceleration along x, in g
+        ("displacement", 0, 0.05, r"displacement of x 4\d\.\d* mm, limit 44\.5 mm, at"),
+        ("displacement", 3, 0.05, r"displacement of roll 0\.11\d* deg, limit 0\.111 deg, at"),
+        ("acceleration", 0, 0.02, r"acceleration of x 0\.\d+ g, limit 0\.\d+ g, at"),
+    ],
+)
+def test_a_trip_is_in_the_units_of_the_page(table, name, axis, share, words):
+    table.do("interlock", name=name, limit=share)
+    table.do("setpoint" if name == "displacement" else "span", axis=axis, value=0.1 if axis == 0 else 0.01)
+    if name == "acceleration":
+        table.do("load", sine(frequency=1.0))
+        table.do("run")
+    table.step(3.0)
+    assert re.match(words, table.engine.trip), table.engine.trip

@@ -158,7 +158,7 @@ def test_a_table_is_started_driven_tripped_reset_and_recorded(panel):
             assert panel.listens() == {("udp", HERE), ("tcp", HERE)}  # to nobody beyond this computer
             await anna.refused("no program", "run")
             await anna.refused("span of x is zero", "generator", wave="sine", frequency=0.5, axes=["x"])
-            await anna.refused("displacement limit is 0.89", "span", axis="x", value=2.0)
+            await anna.refused("span of x: 2000 mm; the limit is 890 mm", "span", axis="x", value=2.0)
             await anna.do("span", axis="x", value=0.1)
             await anna.until(lambda: anna.state["span"][0] == 0.1)
             await anna.refused("exceeds the capacity", "generator", wave="sine", frequency=8.0, axes=["x"])
@@ -171,6 +171,12 @@ def test_a_table_is_started_driven_tripped_reset_and_recorded(panel):
             await anna.until(lambda: anna.state["program"]["state"] == "running")
             await anna.refused("stop it first", "motion", name="ridgecrest", scale=0.3, axes="xyz")
             await anna.until(lambda: anna.state["program"]["state"] == "stopped")
+            await anna.do("motion", name="ridgecrest", scale=0.1, axes="xyz")
+            await anna.refused("ridgecrest is being checked; wait", "run")
+            await anna.until(lambda: anna.state["program"]["name"] == "ridgecrest-ccc")
+            assert anna.state["program"]["state"] == "stopped" and anna.state["program"]["checking"] is None
+            await anna.refused("exceeds the capacity", "motion", name="ridgecrest", scale=3.0, axes="xyz")
+            await anna.refused("no program", "run")
             await anna.do("record", on=False)
             await anna.until(lambda: len(anna.state["recordings"]) == 2)
             await anna.do("interlock", name="displacement", limit=0.05)
@@ -313,13 +319,42 @@ def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
     def reads(name: str, word: str) -> str:
         return f"document.getElementById('{name}').textContent.includes('{word}')"
 
+    async def choose_a_motion(tab: Tab):
+        """After a sine, with Run pressed at once: the motion is checked, loaded and run, and the sine is not."""
+        await enter(tab, "cycles", "1")
+        await press(tab, "run")
+        await wait(tab, reads("log", "runs the program sine"))
+        await wait(tab, reads("program-state", "stopped"))
+        await tab.evaluate("document.getElementById('motion').value = 'ridgecrest-ccc'")
+        await enter(tab, "motion-scale", "0.1")
+        await press(tab, "run")
+        await wait(tab, reads("next-step", "Checking ridgecrest-ccc"))
+        assert await tab.evaluate(
+            "document.getElementById('run').disabled && !document.getElementById('stop').disabled"
+        )
+        await wait(tab, reads("program-state", "running"))
+        logged = await tab.evaluate("[...document.querySelectorAll('#log span')].map((span) => span.textContent)")
+        assert logged[:2] == ["runs the program ridgecrest-ccc", "loads ridgecrest-ccc at scale 0.1"]  # newest first
+        await press(tab, "stop")
+        await wait(tab, reads("program-state", "stopped"))
+        await tab.evaluate("document.getElementById('source-generator').click()")
+        await enter(tab, "cycles", "10")
+
     async def look(tab: Tab):
         await wait(tab, reads("machine", "LHPOST6"))
+        await wait(tab, reads("link", "not connected yet"))
+        assert await tab.evaluate("document.getElementById('platen-state').textContent") == "unknown"
         await enter(tab, "name", "Anna")
-        for name in ("take", "pressure-low", "pressure-high", "raise"):
+        await press(tab, "take")
+        for name in ("pressure-low", "pressure-high"):
             await press(tab, name)
+            await wait(tab, reads("pressure-state", name.removeprefix("pressure-")))
+            assert await tab.evaluate("document.getElementById('platen-state').textContent") == "parked"
+        await press(tab, "raise")
         await wait(tab, reads("platen-state", "raised"))
         await enter(tab, "span-x", "100")
+        await wait(tab, reads("log", "sets the span of x to 100 mm"))
+        await choose_a_motion(tab)
         await press(tab, "record")
         await enter(tab, "frequency", "0.5")
         await press(tab, "run")
@@ -334,6 +369,8 @@ def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
         )
         await tab.key("Escape")
         await wait(tab, "document.body.classList.contains('tripped')")
+        sections = "[...document.querySelectorAll('section')].filter((box) => box.scrollWidth > box.clientWidth)"
+        assert await tab.evaluate(f"{sections}.map((box) => box.textContent)") == []  # nothing beyond its box
         await press(tab, "reset")
         await wait(tab, "!document.body.classList.contains('tripped')")
         await press(tab, "record")
@@ -342,7 +379,7 @@ def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
         await wait(tab, f"{frame}.textContent.includes('force')", "the 3-D view")
         return tab.faults
 
-    assert browse(tmp_path, panel.url, look, (1440, 900), 3 * PATIENCE) == []
+    assert browse(tmp_path, panel.url, look, (1300, 900), 4 * PATIENCE) == []
     (recording,) = panel.folder.glob("*.nc")
     assert np.abs(load_record(recording)["platen_displacement"].values[:, 0]).max() > 0.02
 

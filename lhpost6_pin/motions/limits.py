@@ -1,6 +1,6 @@
 """Demand of a target over the capacity of the table, and the largest scale within it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -11,8 +11,8 @@ from ..core.rounding import rounded_down
 from .motion import AXES
 from .process import Target
 
-__all__ = ["Demand", "LimitsSummary", "MotionCheck", "MotionLimits", "Peak", "check_limits", "largest_scale"]
-__all__ += ["limit_peaks", "peak_of_demand"]
+__all__ = ["SI", "Demand", "LimitsSummary", "MotionCheck", "MotionLimits", "Peak", "Units", "check_limits"]
+__all__ += ["largest_scale", "limit_peaks", "peak_of_demand"]
 
 _QUANTITIES = ("displacement", "velocity", "acceleration")
 _FULL = 1 + 1e-6  # a motion exactly at the limit passes despite rounding
@@ -56,6 +56,12 @@ MotionCheck = Callable[[np.ndarray, np.ndarray, np.ndarray], Sequence[Demand]]
 """From displacement, velocity and acceleration (n, 6) of a motion to its demands on a table."""
 
 
+Units = Mapping[str, tuple[str, float]]
+"""From an SI unit of a text, such as "rad/s^2", to the unit in its place and the factor to it; others stay in SI."""
+
+SI: Units = {}
+
+
 class Motion(Protocol):
     """A motion of C and Euler angles, such as a target or what was achieved; each (n, 6)."""
 
@@ -93,14 +99,16 @@ class LimitsSummary:
         return max(rows, key=lambda item: item[2])
 
 
-def check_limits(target: Target, limits: MotionLimits, check: MotionCheck | None = None) -> LimitsSummary:
+def check_limits(
+    target: Target, limits: MotionLimits, check: MotionCheck | None = None, units: Units = SI
+) -> LimitsSummary:
     """Utilisation of the table by a target.
 
-    `check` adds demands on actuators and parts. Raises OutOfRangeError with the largest scale within the limits, then a
-    clause per exceeded quantity, axes before actuators: the governing one with its value, limit, time and sample, and
-    the names of the others.
+    `check` adds demands on actuators and parts; texts are in `units`. Raises OutOfRangeError with the largest scale
+    within the limits, then a clause per exceeded quantity, axes before actuators: the governing one with its value,
+    limit, time and sample, and the names of the others.
     """
-    peaks = limit_peaks(target, limits, check)
+    peaks = limit_peaks(target, limits, check, units)
     over = [peak for peak in peaks if peak.decides and peak.utilisation > _FULL]
     if over:
         fits = largest_scale(target, limits, check)
@@ -162,25 +170,39 @@ def _bracketed(target: Target, check: MotionCheck, high: float, share: float, go
     return low
 
 
-def peak_of_demand(demand: Demand) -> list[Peak]:
-    """Largest share of each axis, actuator or part of a demand."""
+def peak_of_demand(demand: Demand, units: Units = SI) -> list[Peak]:
+    """Largest share of each axis, actuator or part of a demand, with texts in `units`."""
     shares = np.nan_to_num(np.abs(demand.share), nan=np.inf, posinf=np.inf)
     peaks = []
     for i, name in enumerate(demand.names):
         sample = int(np.argmax(shares[:, i]))
         share = float(shares[sample, i])
         text = f"{100 * share:.4g} % {demand.of}" if np.isfinite(share) else f"infinitely many times {demand.of}"
+<<<<<<< HEAD
         if demand.value is not None and demand.unit:
             text = f"{abs(demand.value[sample, i]):.4g} {demand.unit}, {text}"
+=======
+        if demand.value is not None:
+            text = f"{_with_unit(abs(demand.value[sample, i]), demand.unit, units)}, {text}"
+>>>>>>> 03524cfc055fa40552f81c5d0c7b6bd490b34870
         value = None if demand.value is None else float(demand.value[sample, i])
         peaks.append(Peak(demand.quantity, name, share, sample, text, demand.decides, value))
     return peaks
 
 
-def limit_peaks(motion: Motion, limits: MotionLimits, check: MotionCheck | None = None) -> tuple[Peak, ...]:
-    """Largest demand of a motion on every limit, axes before actuators and parts; nothing is refused."""
+def limit_peaks(
+    motion: Motion, limits: MotionLimits, check: MotionCheck | None = None, units: Units = SI
+) -> tuple[Peak, ...]:
+    """Largest demand of a motion on every limit, axes before others, with texts in `units`; nothing is refused."""
     demands = _demands(motion, check) if check else ()
-    return (*_axis_peaks(motion, limits), *(peak for demand in demands for peak in peak_of_demand(demand)))
+    on_axes = _axis_peaks(motion, limits, units)
+    return (*on_axes, *(peak for demand in demands for peak in peak_of_demand(demand, units)))
+
+
+def _with_unit(value: float, unit: str, units: Units) -> str:
+    """A value in SI as text in the unit that replaces it."""
+    name, factor = units.get(unit, (unit, 1.0))
+    return f"{factor * value:.4g} {name}"
 
 
 def _clauses(over: Sequence[Peak], time: np.ndarray) -> list[str]:
@@ -196,7 +218,7 @@ def _clauses(over: Sequence[Peak], time: np.ndarray) -> list[str]:
     return clauses
 
 
-def _axis_peaks(target: Motion, limits: MotionLimits) -> list[Peak]:
+def _axis_peaks(target: Motion, limits: MotionLimits, units: Units = SI) -> list[Peak]:
     peaks = []
     for quantity, per in zip(_QUANTITIES, ("", "/s", "/s^2"), strict=True):
         values = getattr(target, quantity)
@@ -208,8 +230,13 @@ def _axis_peaks(target: Motion, limits: MotionLimits) -> list[Peak]:
             sample = int(np.argmax(shares))
             value, limit = abs(float(values[sample, i])), float(bounds[sample])
             unit = ("m" if i < 3 else "rad") + per
+<<<<<<< HEAD
             text = f"{value:.4g} {unit} against {limit:.4g} {unit}"
             peaks.append(Peak(quantity, axis, value / limit, sample, text, value=value))
+=======
+            text = f"{_with_unit(value, unit, units)} against {_with_unit(limit, unit, units)}"
+            peaks.append(Peak(quantity, axis, value / limit, sample, text))
+>>>>>>> 03524cfc055fa40552f81c5d0c7b6bd490b34870
     return peaks
 
 

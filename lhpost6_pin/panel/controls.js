@@ -1,7 +1,6 @@
 // Orders: what may be done now, why not otherwise, and what comes next.
 import { GRAVITY, factor, make, part, show, write } from "./parts.js";
 
-const ANSWER = 250, PATIENCE = 3000; // [ms] at least until a loaded program is run; at most until its name is seen
 let hello = null, state = null, send = () => {}, complain = () => {}, loading = null, refused = 0;
 
 const swept = () => part("wave").value === "sweep";
@@ -49,17 +48,21 @@ export function described() { // the chosen program in a line
   return `${found.wave} ${found.frequency} Hz${length}; ${found.axes.map((axis) => peaks(found, axis)).join("; ")}`;
 }
 function run() { // loads the chosen program, and runs it unless it is refused
-  if (state.program.state !== "stopped") { send({ do: "run" }); return; }
-  loading = { begun: performance.now(), refused, states: 0 };
+  const { state: now, number } = state.program;
+  if (now !== "stopped") { send({ do: "run", number }); return; }
+  loading = { after: number, refused };
   send(source() === "motion" ? motion() : generator());
 }
-function proceed() { // after each state: a program that was loaded is run
+function proceed() { // after each state: the chosen program is run once it is loaded, by its number
   if (!loading) return;
-  const waited = performance.now() - loading.begun;
-  if (loading.refused !== refused || state.trip || state.you.role !== "operator") { loading = null; return; }
-  if (++loading.states < 3 || waited < ANSWER || (!state.program.name && waited < PATIENCE)) return;
+  const { number, checking } = state.program;
+  if (loading.refused !== refused || state.trip || state.pressure !== "high" || state.you.role !== "operator") { loading = null; return; }
+  if (checking !== null || number <= loading.after) return;
   loading = null;
-  send({ do: "run" });
+  send({ do: "run", number });
+}
+export function waits() { // the name of the program that is being checked, or ""
+  return state?.program.checking ?? (loading ? (source() === "motion" ? part("motion").value : part("wave").value) : "");
 }
 export function noteRefusal() {
   refused++;
@@ -73,26 +76,27 @@ export function forget() { // a connection that is lost takes a half-given order
 function reasons() { // by id: why not, or ""
   const { pressure, platen, trip, program, operator, recording, you } = state, busy = program.state !== "stopped";
   const mine = you.role === "operator" ? "" : operator ? `you are watching: ${operator} has the controls` : "take control first";
-  const tripped = trip ? "tripped: reset first" : "", parked = platen === "parked" || trip ? "" : "park the platen first";
+  const tripped = trip ? "tripped: reset first" : "", parked = platen === "parked" || trip || !hello.parks ? "" : "park the platen first";
   const raised = tripped || (pressure !== "high" ? "high pressure first" : platen === "moving" ? "the platen is moving" : platen !== "raised" ? "raise the platen first" : "");
-  const sourced = mine || (busy ? "stop the program first" : "");
+  const waiting = waits() ? `${waits()} is being checked; wait` : "";
+  const sourced = mine || (busy ? "stop the program first" : waiting);
   return {
-    "pressure-off": mine || (pressure === "off" ? "pressure is off" : pressure === "high" ? "low pressure first" : parked),
+    "pressure-off": mine || (pressure === "off" ? "pressure is off" : pressure === "high" ? "low pressure first" : ""),
     "pressure-low": mine || (pressure === "low" ? "pressure is low" : pressure === "off" ? tripped : parked),
     "pressure-high": mine || (pressure === "high" ? "pressure is high" : pressure === "off" ? "low pressure first" : tripped),
-    raise: mine || tripped || (pressure !== "high" ? "high pressure first" : platen === "raised" ? "already raised" : platen === "moving" ? "the platen is moving" : ""),
-    park: mine || tripped || (platen === "parked" ? "already parked" : platen === "moving" ? "the platen is moving" : busy ? "stop the program first" : ""),
+    raise: mine || tripped || (pressure !== "high" ? "high pressure first" : platen === "raised" ? "already raised" : platen === "moving" ? "the platen is moving" : waiting),
+    park: mine || tripped || (platen === "parked" ? "already parked" : platen === "moving" ? "the platen is moving" : busy ? "stop the program first" : waiting),
     trip: mine || (trip ? "already tripped" : ""),
     reset: mine || (trip ? "" : "not tripped"),
-    run: mine || raised || (loading ? "loading" : program.state === "running" ? "running" : program.state === "stopping" ? "stopping" : busy ? "" : amiss()),
+    run: mine || raised || waiting || (program.state === "running" ? "running" : program.state === "stopping" ? "stopping" : busy ? "" : amiss()),
     hold: mine || tripped || (program.state === "holding" ? "holding" : program.state === "running" ? "" : "no program is running"),
-    stop: mine || tripped || (program.state === "stopping" ? "stopping" : busy || loading ? "" : "no program is running"),
+    stop: mine || tripped || (program.state === "stopping" ? "stopping" : busy || waiting ? "" : "no program is running"),
     take: you.role === "operator" ? "you have the controls" : operator ? `${operator} has the controls and must release them first` : "",
     release: you.role === "operator" ? "" : "you do not have the controls",
     record: mine || (recording || pressure !== "off" ? "" : "nothing to record: pressure is off"),
     "record-name": mine || (recording ? "recording" : ""),
     name: "",
-    ...Object.fromEntries(hello.axes.flatMap((axis) => [[`setpoint-${axis}`, mine || raised], [`span-${axis}`, mine]])),
+    ...Object.fromEntries(hello.axes.flatMap((axis) => [[`setpoint-${axis}`, mine || raised || waiting], [`span-${axis}`, mine || waiting]])),
     ...Object.fromEntries([...part("program").querySelectorAll("fieldset input, fieldset select")].map(({ id }) => [id, sourced])),
     ...Object.fromEntries([...part("interlocks").querySelectorAll("input")].map(({ id }) => [id, mine])),
     ...Object.fromEntries([...part("faults").querySelectorAll("input")].map(({ id }) => [id, ""])), // a trainer may be a watcher
@@ -106,7 +110,7 @@ function upNext() { // the id of what comes next, and the step in words
   if (pressure === "low") return ["pressure-high", "Next: High pressure, the controller takes over."];
   if (platen === "parked") return ["raise", "Next: Raise the platen to its zero position."];
   if (platen === "moving") return ["", "The platen is moving, please wait."];
-  if (loading) return ["", "Loading the program."];
+  if (waits()) return ["", `Checking ${waits()} against the capacity of the table. Run waits until it is loaded; Stop cancels.`];
   if (program.state === "running") return ["", `${program.name} is running. Hold pauses it, Stop ends it.`];
   if (program.state === "holding") return ["run", `${program.name} is held. Run goes on, Stop ends it.`];
   if (program.state === "stopping") return ["", "Returning to the setpoint."];

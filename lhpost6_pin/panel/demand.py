@@ -7,6 +7,7 @@ from ..core.names import AXES, SAMPLE_RATE
 from ..mechanics.plant import Plant
 from ..motions import Reference, Target
 from ..simulation.motion_limits import check_motion_limits
+from .page_units import PAGE_UNITS
 from .programs import Program
 
 __all__ = ["check_program"]
@@ -18,7 +19,8 @@ _CYCLES, _LONGEST = 3.0, 60.0
 def check_program(plant: Plant, program: Program, gain: Array, setpoint: Array) -> None:
     """Check the motion of a program times `gain` (6,) about a setpoint (6,) at full rate of its clock.
 
-    Raises OutOfRangeError naming the limits that it exceeds.
+    Raises OutOfRangeError naming the limits that it exceeds, in the units of the page, and the largest scale that fits:
+    of a motion as of its field, of a wave as a share of the spans.
     """
     seconds = program.duration or _LONGEST
     frequency = getattr(program, "frequency", None)
@@ -27,6 +29,7 @@ def check_program(plant: Plant, program: Program, gain: Array, setpoint: Array) 
     time = np.arange(int(np.ceil(seconds * SAMPLE_RATE)) + 1) / SAMPLE_RATE
     moved = program.at(time)
     axes = tuple((axis, axis) for axis in AXES)
-    reference = Reference(program.name, "panel", 1.0, axes, 0.0, 0.0, 0.0)
+    scale = 1.0 if program.by_span else float(np.abs(gain).max())
+    reference = Reference(program.name, "panel", scale, axes, 0.0, 0.0, 0.0)
     rows = (setpoint + gain * moved.value, gain * moved.rate, gain * moved.acceleration)
-    check_motion_limits(plant, Target(time, *rows, reference))
+    check_motion_limits(plant, Target(time, *rows, reference), PAGE_UNITS)

@@ -83,11 +83,14 @@ class Drive:
         if self.program is not None and not self.program.by_span:
             self._move_gain(np.full(6, scale), sample)
 
-    def load(self, program: Program) -> None:
-        """Take a program in place of another, which must be stopped."""
+    def load(self, program: Program | None, scale: float | None = None) -> None:
+        """Take a program in place of another, which must be stopped, at a scale if it has one; None: no program."""
         self.program, self._clock, self._stopping = program, 0.0, False
-        self._gain = at_rest(self.span if program.by_span else np.full(6, self.scale))
+        self.scale = self.scale if scale is None else scale
         self._rate = at_rest(np.zeros(1))
+        if program is None:
+            return
+        self._gain = at_rest(self.span if program.by_span else np.full(6, self.scale))
 
     def run(self, sample: int) -> None:
         """Start the program, or go on after a hold."""

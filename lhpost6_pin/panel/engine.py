@@ -48,6 +48,7 @@ class Status(NamedTuple):
     limits: tuple[float, ...]  # as `INTERLOCKS`
     on: tuple[bool, ...]
     where: tuple[str, ...]
+    number: int = 0  # of the choice that loaded the program
 
 
 class Engine:
@@ -73,6 +74,7 @@ class Engine:
         self._tolerance = numbers.number("raised.tolerance") * max(limits.displacement[2], 1e-3)
         self._drive = Drive(numbers, self._speed, np.zeros(6))
         self.pressure, self.trip = "low", ""
+        self._number = 0
         self._place, self._lifted, self._state = "raised", True, PlantState.WAITING
         self._memory = self._controller.init()
         self._command = rest.spool.copy()
@@ -100,7 +102,8 @@ class Engine:
             "setpoint": self._setpoint,
             "span": lambda o: self._drive.set_span(_with_axis(self._drive.span, o), self._next),
             "scale": lambda o: self._drive.set_scale(float(o["value"]), self._next),
-            "load": lambda _: self._load(program),
+            "unload": lambda _: self._load(None, {}),
+            "load": lambda o: self._load(program, o),
             "run": self._run,
             "hold": self._hold,
             "stop": lambda _: None if self._free else self._drive.stop(self._next),
@@ -141,14 +144,19 @@ class Engine:
         self._ready(raised=True)
         self._drive.move_setpoint(_with_axis(self._drive.setpoint, order), self._next)
 
-    def _load(self, program: Program | None) -> None:
+    def _load(self, program: Program | None, order: Mapping[str, Any]) -> None:
         _refuse(not self._free, "a program runs; stop it first")
-        assert program is not None
-        self._drive.load(program)
+        self._drive.load(program, order.get("scale"))
+        self._number = 0 if program is None else int(order.get("number", 0))
 
-    def _run(self, _: Mapping[str, Any]) -> None:
+    def _run(self, order: Mapping[str, Any]) -> None:
+        """Run what is loaded, which is to be the choice that the order names if it names one."""
         self._ready(raised=True)
-        _refuse(self._drive.program is None, "no program; choose a wave of the function generator or a motion")
+        program = self._drive.program
+        if program is None:
+            raise ControllerError("no program; choose a wave of the function generator or a motion")
+        other = order.get("number", self._number) != self._number
+        _refuse(other, f"another program is loaded meanwhile: {program.name}; choose again")
         self._drive.run(self._next)
 
     def _hold(self, _: Mapping[str, Any]) -> None:
@@ -201,6 +209,8 @@ class Engine:
     @property
     def platen(self) -> str:
         """Whether the platen is parked, raised, or moving from one to the other."""
+        if self.pressure != "high":
+            return "parked" if self._near(self._parked) else "raised"
         settled = self._drive.state(self._last).settled
         if self._place == "parked":
             return "parked" if settled and self._near(self._parked) else "moving"
@@ -244,6 +254,7 @@ class Engine:
             tuple(map(float, look.limit)),
             tuple(map(bool, look.on)),
             tuple(look.where(i) for i in range(len(INTERLOCKS))),
+            self._number,
         )
 
     def _fill(self, reading: Reading, now: Measured, wanted: Moved | None) -> None:

@@ -18,13 +18,14 @@ from ..machine.parameters import Parameters
 from ..mechanics.actuator_forces import axis_capacity, force_range, wrench_at_bearings
 from ..mechanics.equilibrium import Equilibrium
 from ..mechanics.instant import motion_at
+from .page_units import in_page_units, place_unit
 
 __all__ = ["INTERLOCKS", "Interlocks", "Measured", "measured_motion"]
 
 INTERLOCKS = ("displacement", "velocity", "acceleration", "force", "overturning", "saturation")
 """Names of the interlocks, in the order of a row's shares."""
 
-_UNITS = {"displacement": ("m", "rad"), "velocity": ("m/s", "rad/s"), "acceleration": ("m/s2", "rad/s2")}
+_PER = {"displacement": "", "velocity": "/s", "acceleration": "/s^2"}
 
 
 class Measured(NamedTuple):
@@ -123,11 +124,11 @@ class Interlocks:
         return AXES[3 + at] if INTERLOCKS[i] == "overturning" else self._names[at]
 
     def reason(self, i: int, time: float) -> str:
-        """Why an interlock trips, in words."""
+        """Why an interlock trips, in words and the units of the page."""
         name, at, share = INTERLOCKS[i], int(self._worst[i]), float(self.shares[i])
         what = f"{name} of {self.where(i)} at {100.0 * share:.1f} % of capacity, limit {100.0 * self.limit[i]:g} %"
         if i < 3:
-            unit = _UNITS[name][at > 2]
-            bound = float(self._capacity[i, at])
-            what = f"{name} of {self.where(i)} {share * bound:.4g} {unit}, limit {self.limit[i] * bound:.4g} {unit}"
+            unit, bound = place_unit(AXES[at]) + _PER[name], float(self._capacity[i, at])
+            value, limit = (in_page_units(x * bound, unit, 4) for x in (share, float(self.limit[i])))
+            what = f"{name} of {self.where(i)} {value}, limit {limit}"
         return f"{what}, at {time:.3f} s"

@@ -1,4 +1,4 @@
-"""Orders of the controller from messages of a page, within what the table can do."""
+"""Orders of the controller from messages of a page, within what the table can do, in the units of the page."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,20 +16,23 @@ from ..motions import make_target
 from .demand import check_program
 from .engine import Status
 from .interlocks import INTERLOCKS
+from .page_units import in_page_units, place_unit
 from .programs import Program, Recorded, make_wave
 
 __all__ = ["Orders", "pressed"]
 
 
 class Orders:
-    """Makes orders, plain entries with `what` in words for the journal; attribute `program`, the one loaded last."""
+    """Makes orders, plain entries with `what` in words for the journal.
+
+    Attribute `program`: the one that the controller has loaded, or None; whoever sends the orders sets it.
+    """
 
     def __init__(self, machine: Machine, numbers: Parameters, folder: Path) -> None:
         """Take the limits of a machine; motions are written into the folder for the controller."""
         self._machine, self._numbers, self._folder = machine, numbers, folder
         self._plant = make_plant(machine)
         self.program: Program | None = None
-        self._motions = 0
 
     def of(self, do: str, message: Mapping[str, Any], status: Status | None) -> dict[str, Any]:
         """The order of a message in a state of the table; None: the pressure is off.
@@ -43,14 +46,13 @@ class Orders:
             return self._six(do, str(message["axis"]), float(message["value"]), pressed(status))
         if do == "scale":
             return self._scale(float(message["value"]), pressed(status))
-        if do == "generator":
-            return self._wave(message, pressed(status))
-        if do == "motion":
-            return self._motion(str(message["name"]), message.get("axes"), float(message["scale"]), pressed(status))
+        if do == "run":
+            stated = {"number": int(message["number"])} if message.get("number") is not None else {}
+            return {"do": do, **stated, "what": f"runs the program {self.program.name if self.program else ''}".strip()}
         if do == "interlock":
             if message["name"] not in INTERLOCKS:
                 raise ControllerError(f"no interlock {message['name']!r}; there are {', '.join(INTERLOCKS)}")
-            limit = f" limit {100.0 * float(message['limit']):g} %" if "limit" in message else ""
+            limit = f" limit {100.0 * float(message['limit']):g} % of capacity" if "limit" in message else ""
             on = f" {'on' if message['on'] else 'off'}" if "on" in message else ""
             return {**message, "what": f"sets the interlock {message['name']}:{limit}{on}"}
         if do == "fault":
@@ -58,30 +60,44 @@ class Orders:
             name = str(message["name"]) if where == "all" else f"{message['name']}@{where}"
             what = f"switches the fault {name} {'on' if message['on'] else 'off'}"
             return {"do": do, "name": name, "on": bool(message["on"]), "what": what}
-        words = {"raise": "raises the platen", "park": "parks the platen", "run": "runs the program", "reset": "resets"}
+        words = {"raise": "raises the platen", "park": "parks the platen", "reset": "resets"}
         words |= {"hold": "holds the program", "stop": "stops the program", "trip": "trips the table"}
         if do not in words:
             raise ControllerError(f"no order {do!r}")
         return {"do": do, "what": words[do]}
+
+    def choose(self, message: Mapping[str, Any], status: Status | None, number: int) -> tuple[dict[str, Any], Program]:
+        """The order that loads the program which a message chooses, and that program, checked in a state of the table.
+
+        `number` tells choices apart. Takes seconds for a long motion; raises as `of`.
+        """
+        if message["do"] == "generator":
+            order, program = self._wave(message, pressed(status))
+        else:
+            scale, axes = float(message["scale"]), message.get("axes")
+            order, program = self._motion(str(message["name"]), axes, scale, pressed(status), number)
+        return {**order, "do": "load", "number": number}, program
 
     def _six(self, do: str, axis: str, value: float, status: Status) -> dict[str, Any]:
         """A setpoint or span of one axis, within what the table can do."""
         at = AXES.index(axis)
         limit = self._machine.limits.displacement[at] if at in self._plant.axes else 0.0
         if not abs(value) <= limit:
-            raise ControllerError(f"{do} of {axis} is {value:g}; the displacement limit is {limit:g}")
+            wanted, most = in_page_units(value, place_unit(axis)), in_page_units(limit, place_unit(axis))
+            raise ControllerError(f"{do} of {axis}: {wanted}; the limit is {most}")
         if self.program is not None and self.program.by_span:
-            wanted = {"span": np.array(status.span), "setpoint": np.array(status.setpoint)}
-            wanted[do][at] = value
-            check_program(self._plant, self.program, wanted["span"], wanted["setpoint"])
-        return {"do": do, "axis": at, "value": value, "what": f"sets the {do} of {axis} to {value:g} {_unit(axis)}"}
+            both = {"span": np.array(status.span), "setpoint": np.array(status.setpoint)}
+            both[do][at] = value
+            check_program(self._plant, self.program, both["span"], both["setpoint"])
+        what = f"sets the {do} of {axis} to {in_page_units(value, place_unit(axis))}"
+        return {"do": do, "axis": at, "value": value, "what": what}
 
     def _scale(self, value: float, status: Status) -> dict[str, Any]:
         if self.program is not None and not self.program.by_span:
             check_program(self._plant, self.program, np.full(6, value), np.array(status.setpoint))
         return {"do": "scale", "value": value, "what": f"sets the scale of the motion to {value:g}"}
 
-    def _wave(self, message: Mapping[str, Any], status: Status) -> dict[str, Any]:
+    def _wave(self, message: Mapping[str, Any], status: Status) -> tuple[dict[str, Any], Program]:
         """A wave on axes that have a span."""
         axes = tuple(AXES.index(str(axis)) for axis in message["axes"])
         given = {key: float(message[key]) for key in ("cycles", "to", "duration") if message.get(key) is not None}
@@ -91,21 +107,20 @@ class Orders:
         if still:
             raise ControllerError(f"the span of {', '.join(still)} is zero; set one first")
         check_program(self._plant, wave, np.array(status.span), np.array(status.setpoint))
-        self.program = wave
-        return {"do": "load", "wave": wave, "what": f"loads {wave.name} on {', '.join(AXES[k] for k in axes)}"}
+        return {"wave": wave, "what": f"loads {wave.name} on {', '.join(AXES[k] for k in axes)}"}, wave
 
-    def _motion(self, name: str, axes: str | None, scale: float, status: Status) -> dict[str, Any]:
+    def _motion(
+        self, name: str, axes: str | None, scale: float, status: Status, number: int
+    ) -> tuple[dict[str, Any], Program]:
         """A motion by name, as rows in a file."""
         own = None if self._machine.motion == "free" else self._machine.motion
         target = make_target(motion_of(name, []), axes=axes or own, rate=float(SAMPLE_RATE))
         program = Recorded(target.reference.motion, target.displacement, target.velocity, target.acceleration)
         check_program(self._plant, program, np.full(6, scale), np.array(status.setpoint))
-        file = self._folder / f"motion-{self._motions}.npy"
+        file = self._folder / f"motion-{number}.npy"
         np.save(file, np.stack([target.displacement, target.velocity, target.acceleration]))
-        self._motions += 1
-        self.program = program
         what = f"loads {program.name} at scale {scale:g}"
-        return {"do": "load", "file": str(file), "name": program.name, "scale": scale, "what": what}
+        return {"file": str(file), "name": program.name, "scale": scale, "what": what}, program
 
 
 def pressed(status: Status | None) -> Status:
@@ -113,7 +128,3 @@ def pressed(status: Status | None) -> Status:
     if status is None:
         raise ControllerError("the pressure is off; set it low, then high")
     return status
-
-
-def _unit(axis: str) -> str:
-    return "m" if axis in AXES[:3] else "rad"

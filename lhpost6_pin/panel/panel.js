@@ -1,5 +1,5 @@
 // The panel: the websocket, and the state of the table on the page.
-import { buildPrograms, connectControls, described, forget, lock, noteRefusal, refresh, sendName, showRecording } from "./controls.js";
+import { buildPrograms, connectControls, described, forget, lock, noteRefusal, refresh, sendName, showRecording, waits } from "./controls.js";
 import { part, write } from "./parts.js";
 import { addSamples, newest, prepareScopes } from "./scopes.js";
 import { addLog, buildAxes, clearLog, showBars, showFaults, showInterlocks, showPlace, showRecordings, showSettings } from "./tables.js";
@@ -50,13 +50,15 @@ function steps({ pressure, platen }) {
 }
 function progress({ name, state, time, duration }) {
   const busy = state !== "stopped";
-  write(part("program-name"), busy ? `${name}, ${state}` : `Chosen: ${described()}`);
+  write(part("program-name"), busy ? `${name}, ${state}` : `${waits() ? "Checking" : "Chosen"}: ${described()}`);
   write(part("progress-text"), !busy ? "" : duration === null ? `${time.toFixed(1)} s, until stopped` : `${time.toFixed(1)} of ${duration.toFixed(1)} s`);
   part("progress").value = busy && duration ? Math.min(time / duration, 1) : 0;
-  write(part("program-state"), state);
+  write(part("program-state"), !busy && waits() ? "checking" : state);
+  write(part("run"), !busy && waits() ? "Checking" : "Run");
 }
-function link({ link: { ok, late, samples, holds }, server }) {
-  write(part("link"), server === "none" ? "none" : ok ? `✓ ok, ${(100 * late).toFixed(2)} % late` : `! lost, ${(100 * late).toFixed(2)} % late`);
+function link({ link: { word, late, samples, holds }, server }) {
+  const share = `${(100 * late).toFixed(2)} % late`;
+  write(part("link"), word === "on" ? `✓ ok, ${share}` : word === "lost" ? `! lost, ${share}` : samples ? "closed" : "not connected yet");
   part("link").title = `Server ${server}: ${samples} samples, ${(100 * late).toFixed(3)} % of them late, ${holds} safe hold${holds === 1 ? "" : "s"}`;
 }
 function tell(state) {

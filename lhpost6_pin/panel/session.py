@@ -1,7 +1,7 @@
 """The state of a panel between its browsers and the controller: clients, orders, recordings, the journal."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +13,8 @@ from ..core.errors import ControllerError, LhpostError
 from ..data.records import save_record
 from ..data.sensors import SensorSet
 from ..simulation.simulated_campaign import SensorErrors, as_sensed
+from .choice import Choice
+from .client import Client
 from .engine import Status
 from .journal import Journal
 from .orders import Orders, pressed
@@ -22,19 +24,11 @@ from .ring import RingReader
 from .timekeeping import Timekeeping
 from .worker import Setup, panel_numbers, rows_of
 
-__all__ = ["OPERATOR_ONLY", "Client", "Options", "Session"]
+__all__ = ["OPERATOR_ONLY", "Options", "Session"]
 
 OPERATOR_ONLY = {"pressure", "raise", "park", "setpoint", "span", "scale", "generator", "motion", "run", "hold", "stop"}
 OPERATOR_ONLY |= {"reset", "interlock", "record"}
 """Orders that only the operator may give; anybody may trip the table."""
-
-
-class Client:
-    """A browser: its number, the name of its user, and how it is informed that an order was refused."""
-
-    def __init__(self, number: str, refuse: Callable[[str], None]) -> None:
-        """Join as a watcher."""
-        self.number, self.name, self.refuse = number, f"guest {number}", refuse
 
 
 class Options(NamedTuple):
@@ -50,8 +44,8 @@ class Session:
     """A panel: its clients, the controller's process, and the plant's, unless a server elsewhere is driven.
 
     Attributes: clients by number; operator, one of them or None; status of the controller, None while the pressure is
-    off; journal; recording and recordings, the files of those that ended; news of the link; time, how
-    well the plant's clock is kept.
+    off; journal; recording and recordings, the files of those that ended; choice of a program; news of the link: off,
+    on or lost; time, how well the plant's clock is kept.
     """
 
     def __init__(
@@ -79,6 +73,8 @@ class Session:
         self.link, self.time = "off", Timekeeping(self.layout, options.pace)
         self.server = "of its own" if server is None else f"{server[0]}:{server[1]}"
         self._orders = Orders(setup.machine, self._numbers, setup.ring.parent)
+        self.choice = Choice(self._orders, work, self._send)
+        self._low: tuple[Client, Future[dict[str, Any]]] | None = None
         self.faults: dict[str, bool] = {}
 
     def _start_control(self) -> None:
@@ -110,10 +106,11 @@ class Session:
         if self.operator is not client:
             return
         self.operator = None
+        self.choice.cancel()
         running = self.status is not None and self.status.state in ("running", "holding")
         self.journal.note(client.name, "left the panel" + (" in mid-run: the program is stopped" if running else ""))
-        if running:
-            self._control.order({"do": "stop", "by": client.number, "who": client.name, "what": ""})
+        if self.status is not None:  # also of a program that has been run since
+            self._send(client, {"do": "stop", "what": ""})
 
     def role(self, client: Client) -> str:
         """Role of a client."""
@@ -124,10 +121,8 @@ class Session:
         """Do what a browser wants, or refuse it with the reason. Never raises for what a browser may send."""
         try:
             self._take(client, dict(message))
-        except LhpostError as error:
-            client.refuse(str(error))
-        except (KeyError, TypeError, ValueError) as error:
-            client.refuse(f"the page sent what the panel does not understand: {error!r}; load the page again")
+        except (LhpostError, KeyError, TypeError, ValueError) as error:
+            client.explain(error)
 
     def _take(self, client: Client, message: dict[str, Any]) -> None:
         do = str(message["do"])
@@ -150,32 +145,30 @@ class Session:
         if do == "record":
             self._record(client, bool(message["on"]), str(message.get("name", "")))
             return
-        order = self._order(do, message)
-        if isinstance(order, Future):
-            order.add_done_callback(lambda done: self._send_later(client, done))
+        if do in ("generator", "motion"):
+            self.choice.begin(client, message, self.status)
+            return
+        self.choice.admit(do)
+        if do == "pressure" and message["to"] == "low":  # a process that starts takes its time
+            self._low = client, self._work.submit(self._begin)
         else:
-            self._send(client, order)
+            self._send(client, self._orders.of(do, message, self.status))
 
     def _send(self, client: Client, order: dict[str, Any]) -> None:
         self._control.order({**order, "by": client.number, "who": client.name})
 
-    def _send_later(self, client: Client, done: "Future[dict[str, Any]]") -> None:
-        """In a thread of the executor: orders need no more than the pipe."""
-        error = done.exception()
-        if error is None:
-            self._send(client, done.result())
-        else:
-            client.refuse(str(error))
+    def _send_prepared(self) -> None:
+        """Send the orders that threads have prepared; here, since a pipe is no place for two threads."""
+        if self._low is not None and self._low[1].done():
+            (client, prepared), self._low = self._low, None
+            error = prepared.exception()
+            if error is None:
+                self._send(client, prepared.result())
+            else:
+                client.explain(error)
+        self.choice.look()
 
-    def _order(self, do: str, message: dict[str, Any]) -> "dict[str, Any] | Future[dict[str, Any]]":
-        """The controller's order of a message; what takes long is made in a thread."""
-        if do == "pressure" and message["to"] == "low":
-            return self._work.submit(self._low)
-        if do == "motion":
-            return self._work.submit(self._orders.of, do, message, self.status)
-        return self._orders.of(do, message, self.status)
-
-    def _low(self) -> dict[str, Any]:
+    def _begin(self) -> dict[str, Any]:
         """Order to begin a session; a plant of the panel's own is started where there is none."""
         address = self._options.server
         if address is None:
@@ -235,6 +228,7 @@ class Session:
         if not self._control.alive:
             self._handle("lost", "the controller's process ended; another is started")
             self._start_control()
+        self._send_prepared()
         rows = self._ring.read()
         if len(rows):
             self.time.add(rows)
@@ -245,6 +239,7 @@ class Session:
     def _end(self) -> None:
         """Without a session there is no state, and no program."""
         self.status = self._orders.program = None
+        self.choice.drop()
 
     def _handle(self, kind: str, content: Any) -> None:
         if kind == "status":
@@ -254,10 +249,11 @@ class Session:
         elif kind == "done":
             if content["what"]:
                 self.journal.note(content["who"], content["what"])
-            if content["do"] == "load" and "scale" in content:
-                self._control.order({"do": "scale", "value": content["scale"], "who": content["who"], "what": ""})
+            self.choice.done(content, self.status)
         elif kind == "refusal":
-            number, why = content
+            order, why = content
+            self.choice.refused(order)
+            number = order.get("by")
             for client in [self.clients[number]] if number in self.clients else self.clients.values():
                 client.refuse(why)
         elif kind == "faults":

@@ -21,9 +21,10 @@ from ..show.viewer import LiveScene, SharedWindow
 from ..show.viewer.window import HOSTS, write_message
 from ..simulation.limit_use import plant_limits, sample_shares
 from ..simulation.snapshot import Snapshot
+from .client import Client
 from .interlocks import INTERLOCKS
 from .programs import WAVES
-from .session import Client, Session
+from .session import Session
 
 __all__ = ["PanelServer"]
 
@@ -153,6 +154,7 @@ class PanelServer:
             "waves": WAVES,
             "motions": [{"name": m.name, "title": m.title} for m in list_motions() if not m.remedy],
             "limits": {name: getattr(limits, name) for name in ("displacement", "velocity", "acceleration")},
+            "parks": machine.platen.parked is not None,
             "trainer": self._trainer,
             "view": "view/",
         }
@@ -200,7 +202,7 @@ class PanelServer:
                 "holds": session.time.holds,
             },
             "pressure": status.pressure if status else "off",
-            "platen": status.platen if status else "parked",
+            "platen": status.platen if status else "unknown",
             "trip": (status and status.trip) or None,
             "setpoint": status.setpoint if status else (0.0,) * 6,
             "span": status.span if status else (0.0,) * 6,
@@ -216,6 +218,8 @@ class PanelServer:
             "state": status.state if status else "stopped",
             "time": session.layout.of(self._last[None], "program_time").item(),
             "duration": status.duration if status else None,
+            "number": status.number if status else 0,
+            "checking": session.choice.name,
         }
         count = len(INTERLOCKS)
         shares = session.layout.of(self._last[None], "shares")[0] if status else np.zeros(count)

@@ -27,7 +27,7 @@ from .programs import Program, Recorded
 from .ring import Ring
 from .rows import Rows
 
-__all__ = ["Setup", "control", "panel_numbers", "rows_of", "serve_plant"]
+__all__ = ["Setup", "control", "panel_numbers", "program_of", "rows_of", "serve_plant"]
 
 _IDLE = 0.1  # [s] between looks at orders
 _SILENCE = 1.0  # [s] without sensors until the link is lost
@@ -157,16 +157,21 @@ class _Controller:
 
     def _look(self, show: bool = True) -> None:
         """Take orders and, if it is to be, show the state."""
-        if show and self._engine is not None and self._client is not None:
-            status = self._engine.status
-            if status != self._shown:
-                self._shown = status
-                self._link.report("status", status)
-            if self._client.faults != self._offered:
-                self._offered = dict(self._client.faults)
-                self._link.report("faults", self._offered)
+        if show:
+            self._show()
         self._link.look()
         self._obey()
+
+    def _show(self) -> None:
+        if self._engine is None or self._client is None:
+            return
+        status = self._engine.status
+        if status != self._shown:
+            self._shown = status
+            self._link.report("status", status)
+        if self._client.faults != self._offered:
+            self._offered = dict(self._client.faults)
+            self._link.report("faults", self._offered)
 
     def _obey(self) -> None:
         while self._link.orders:
@@ -174,8 +179,9 @@ class _Controller:
             try:
                 self._do(order)
             except (LhpostError, KeyError, TypeError, ValueError) as error:  # the rest: an order that no page sends
-                self._link.report("refusal", (order.get("by"), str(error)))
+                self._link.report("refusal", (order, str(error)))
             else:
+                self._show()  # before: whoever learns that an order is done has the state that it made
                 self._link.report("done", order)
 
     def _do(self, order: Mapping[str, Any]) -> None:
@@ -198,7 +204,7 @@ class _Controller:
         if self._engine is None:
             raise SimulationError("the pressure is off; set it low, then high")
         before = self._engine.commanding
-        self._engine.order(order, _program_of(order))
+        self._engine.order(order, program_of(order))
         if self._engine.commanding and not before and self._client is not None:
             self._answer(self._client, self._engine)  # a plant that waits for its first command sends nothing
 
@@ -215,7 +221,7 @@ class _Controller:
         self._shown = None
         self._engine = Engine(self._plant, self._rest, self._setup.settings, self._numbers, self._rows)
         self._client.ask_faults()
-        self._look()
+        self._answer(self._client, self._engine)  # the state is that of the first sample, not of none
 
     def _end(self) -> None:
         """End the session."""
@@ -234,7 +240,7 @@ def _first(pace: float) -> None:
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(os.sched_get_priority_min(os.SCHED_RR)))
 
 
-def _program_of(order: Mapping[str, Any]) -> Program | None:
+def program_of(order: Mapping[str, Any]) -> Program | None:
     """The program that an order brings: a wave, or the name of a motion with the file of its rows."""
     if order["do"] != "load":
         return None

@@ -20,13 +20,14 @@ from ..mechanics.motion_demands import make_motion_check
 from ..mechanics.plant import Plant, make_plant
 from ..mechanics.pose import PlatenMotion
 from ..motions import LimitsSummary, MotionLimits, Peak, Reference, Target, check_limits, largest_scale, limit_peaks
+from ..motions.limits import SI, Units
 
 __all__ = ["Judgement", "check_motion_limits", "fitting_scale", "judge_motion", "judge_record"]
 __all__ += ["refuse_blocked_axes"]
 
 
-def check_motion_limits(plant: Plant, target: Target) -> LimitsSummary:
-    """Demand of a target over the capacity of a plant, by limit.
+def check_motion_limits(plant: Plant, target: Target, units: Units = SI) -> LimitsSummary:
+    """Demand of a target over the capacity of a plant, by limit, with texts in `units`.
 
     Raises OutOfRangeError that names each limit exceeded and the largest scale that fits; where the flow of valves is
     exceeded, also the scale by the other reading of Eq. 4-2. For a guided machine also where the target moves an axis
@@ -35,7 +36,7 @@ def check_motion_limits(plant: Plant, target: Target) -> LimitsSummary:
     refuse_blocked_axes(plant, target)
     bounds = _axis_limits(plant)
     try:
-        return check_limits(target, bounds, make_motion_check(plant))
+        return check_limits(target, bounds, make_motion_check(plant), units)
     except OutOfRangeError as error:
         if "actuator velocity" not in error.exceeded:
             raise

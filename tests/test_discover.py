@@ -716,6 +716,13 @@ def test_an_effect_at_a_bound_is_no_finding(found):
     moved = replace(search, solution=search.solution._replace(x=x))
     less, gone = withdraw_effects(moved, None)
     assert less is moved and gone == (Withdrawn(effect.candidate.name, "stribeck_friction", "at_bound", (size,), ANY),)
+    # nor is it one where the friction of its legs is driven to a bound: it is then this friction, in another form
+    kind = next(c.kind for c in problem.machine.components if c.name in effect.candidate.components)
+    for key, why in (("seal_friction", ["friction"]), ("viscous", [])):
+        x, name = search.solution.x.copy(), f"{kind}.{key}"
+        x[problem.names.index(name)] = bounds_of(problem, search.calibration)[0][problem.names.index(name)]
+        ran = replace(search, solution=search.solution._replace(x=x))
+        assert [one.why for one in withdraw_effects(ran, None)[1]] == why
     verdict = judge(less, (), (), (), gone)
     assert not verdict.effects and verdict.withdrawn == gone
     # if what it explained is far above noise, no parameter of the model does: that is left unexplained

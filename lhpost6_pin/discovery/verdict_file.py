@@ -31,6 +31,7 @@ _WITHDRAWN: dict[Why, str] = {
     "at_bound": "of which a number is at the bound of its range",
     "zero": "whose size cannot be distinguished from zero",
     "own_form": "which is no more than what the form of friction may be off by",
+    "friction": "beside which a number of the report's friction is at the bound of its range, so that it replaces that",
     "held_out": "which lowers the residual of the tests searched, but not of those held out",
 }
 """Why an effect that was added is no finding."""

@@ -1,6 +1,7 @@
 """Effects that a search has added and that are no findings.
 
-An effect is none whose size is at its bound, or that does not close the gap on tests that were not searched. On guides,
+An effect is none whose size is at its bound, or that does not close the gap on tests that were not searched; nor is one
+that may be another form of friction, where the report's friction on its components has run to its bound. On guides,
 where few sensors leave much to be confused, it is none either with any of its numbers at a bound, if it cannot be
 distinguished from zero, or if it is no more than what the form of friction may be off by; there effects are removed one
 by one, with everything else refitted. A platform on legs is judged with all effects in place, but of two that pass for
@@ -24,7 +25,10 @@ from .searched_range import within_search
 
 __all__ = ["Why", "Withdrawn", "lowers_squares", "withdraw_effects"]
 
-Why = Literal["at_bound", "zero", "own_form", "held_out"]
+FRICTION = ("seal_friction", "pad_friction")
+"""Keys of the report's dry friction."""
+
+Why = Literal["at_bound", "zero", "own_form", "friction", "held_out"]
 
 
 class Withdrawn(NamedTuple):
@@ -32,7 +36,7 @@ class Withdrawn(NamedTuple):
 
     name: str  # of the effect
     family: str
-    why: Why  # a number at its bound; zero within its interval; too small beside friction; gain on held-out tests
+    why: Why  # own number at its bound; zero in its interval; small beside friction; in its place; held-out tests
     numbers: tuple[str, ...] = ()  # those at their bounds
     gain: float = float("nan")  # of log-likelihood on the held-out tests
 
@@ -82,12 +86,23 @@ def _by_estimate(
     guided = found.problem.machine.motion != "free"
     if at_bound := tuple(other for other in bounded if other == size or (guided and owns(one, other))):
         return Withdrawn(name, family.named, "at_bound", at_bound)
+    if family.confusable and (ran := _own_friction(found, one, bounded)):
+        return Withdrawn(name, family.named, "friction", ran)
     amplitude = estimates[size]
     if guided and not one.candidate.release and amplitude.low <= 0.0 <= amplitude.high:
         return Withdrawn(name, family.named, "zero")
     if guided and family.confusable and amplitude.unit == "N" and abs(amplitude.value) < _form_error(found, one):
         return Withdrawn(name, family.named, "own_form")
     return None
+
+
+def _own_friction(found: Search, one: AddedEffect, bounded: Sequence[str]) -> tuple[str, ...]:
+    """Numbers of the report's friction on the components of an effect that ran to their bounds, which it replaces.
+
+    Those common to all components of a kind: the effect is then this friction, in another form.
+    """
+    kinds = {c.kind for c in found.problem.machine.components if c.name in one.candidate.components}
+    return tuple(name for kind in kinds for key in FRICTION if (name := f"{kind}.{key}") in bounded)
 
 
 def _form_error(found: Search, one: AddedEffect) -> float:

@@ -178,13 +178,8 @@ def peak_of_demand(demand: Demand, units: Units = SI) -> list[Peak]:
         sample = int(np.argmax(shares[:, i]))
         share = float(shares[sample, i])
         text = f"{100 * share:.4g} % {demand.of}" if np.isfinite(share) else f"infinitely many times {demand.of}"
-<<<<<<< HEAD
         if demand.value is not None and demand.unit:
-            text = f"{abs(demand.value[sample, i]):.4g} {demand.unit}, {text}"
-=======
-        if demand.value is not None:
             text = f"{_with_unit(abs(demand.value[sample, i]), demand.unit, units)}, {text}"
->>>>>>> 03524cfc055fa40552f81c5d0c7b6bd490b34870
         value = None if demand.value is None else float(demand.value[sample, i])
         peaks.append(Peak(demand.quantity, name, share, sample, text, demand.decides, value))
     return peaks
@@ -230,13 +225,8 @@ def _axis_peaks(target: Motion, limits: MotionLimits, units: Units = SI) -> list
             sample = int(np.argmax(shares))
             value, limit = abs(float(values[sample, i])), float(bounds[sample])
             unit = ("m" if i < 3 else "rad") + per
-<<<<<<< HEAD
-            text = f"{value:.4g} {unit} against {limit:.4g} {unit}"
-            peaks.append(Peak(quantity, axis, value / limit, sample, text, value=value))
-=======
             text = f"{_with_unit(value, unit, units)} against {_with_unit(limit, unit, units)}"
-            peaks.append(Peak(quantity, axis, value / limit, sample, text))
->>>>>>> 03524cfc055fa40552f81c5d0c7b6bd490b34870
+            peaks.append(Peak(quantity, axis, value / limit, sample, text, value=value))
     return peaks
 
 

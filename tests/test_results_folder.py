@@ -1,4 +1,4 @@
-"""Directories of results: a file of an earlier command is not replaced without a warning, whichever command replaces it."""
+"""Directories of results: no command replaces a file of an earlier one without a warning."""
 
 import ast
 import shutil

@@ -30,8 +30,8 @@ ResumedOut = Annotated[
 def folder_for(out: Path | None, name: str, *files: str, inputs: Iterable[Path] = (), own: str = "") -> Path:
     """Directory of the results, out/NAME by default; raises OSError at once if it cannot be written.
 
-    Those of `files`, which the command will write, that are there already are a warning, unless a file `own` beside them
-    shows that they are of the same results, which are resumed. RecordError for one of its `inputs` among them.
+    Those of `files`, which the command will write, that are there already are a warning, unless a file `own` beside
+    them shows that they are of the same results, which are resumed. RecordError for one of its `inputs` among them.
     """
     folder = out or Path("out") / name
     written = {(folder / file).resolve() for file in files}

@@ -198,6 +198,23 @@ def test_contradictions_are_counted_beside_what_chance_makes(found):
     assert contradiction_summary(replace(found, subsets=())) == ""
 
 
+def test_contradictions_are_in_the_json_with_both_values_in_their_unit(found):
+    entries = calibration_entries(found)["subsets"]
+    assert entries["compared"] == {"gas law": 1, "wrench, x": 1} and entries["limit"] == found.limit
+    assert entries["expected_by_chance"] == pytest.approx(2 * 0.0027, rel=1e-2)
+    (one,) = entries["contradictions"]
+    height = found.parameters[4]
+    assert (one["unknown"], one["subset"], one["unit"]) == ("hold_down.base_height", "gas law", "m")
+    assert one["deviations"] == pytest.approx(10.0 / np.sqrt(3.0))
+    assert one["joint"] == pytest.approx(height.at(float(found.estimate[4])))
+    assert one["alone"] - one["joint"] == pytest.approx(10.0 * found.sd[4])
+    sensor = found.subsets[0]._replace(
+        estimate=found.estimate + 10.0 * found.sd * (np.arange(7) == 5), sd=2.0 * found.sd
+    )
+    (one,) = calibration_entries(replace(found, subsets=(sensor,)))["subsets"]["contradictions"]
+    assert (one["unknown"], one["unit"]) == ("gain actuator_force[H1]", "1")
+
+
 def test_errors_of_sensors_within_their_stated_ranges_are_no_cause_for_attention(found, tmp_path):
     gain, delay = 5, 6
     stated = np.sqrt(3.0) * found.prior

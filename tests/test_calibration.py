@@ -21,12 +21,14 @@ from lhpost6_pin.identification.calibration import (
     machine_parameters,
     with_parameters,
 )
+from lhpost6_pin.identification.calibration.calibration_summary import chance, compared
 from lhpost6_pin.identification.calibration.fit import solve
 from lhpost6_pin.identification.calibration.free_parameters import FreeParameter, plan_parameters, scatter_parameters
 from lhpost6_pin.identification.calibration.normal_equations import bounded_step, bounds_of
 from lhpost6_pin.identification.calibration.override import save_override
 from lhpost6_pin.identification.calibration.prepare import policy_of
 from lhpost6_pin.identification.calibration.problem import OperatingPoint, Problem, ResidualBands
+from lhpost6_pin.identification.calibration.result import contradictions
 from lhpost6_pin.identification.calibration.sensor_errors import corrected, corrected_record, sensor_unknowns
 from lhpost6_pin.identification.calibration.simulated_residuals import by_simulation
 from lhpost6_pin.identification.calibration.whitened_residuals import (
@@ -506,6 +508,27 @@ def test_simulation_is_a_second_opinion_that_agrees(found, truth):
     assert len(off) > 25  # of 37 parameters
     assert np.median(np.abs(off)) < 1.2
     assert np.abs(off).max() < 5.0  # errors of the sensors, held, are only in the floor
+
+
+@pytest.mark.slow  # a whole campaign
+def test_groups_of_residuals_agree_as_chance_allows_where_nothing_is_wrong(machine, sensors):
+    """Seed 0: with noise in the derivatives left out of the deviations six differed, the farthest by 6.5."""
+    whole = simulate_campaign(machine, load_controller("lhpost6"), sensors, seed=0)
+    null = calibrate(machine, whole.records, sensors)
+    apart = [one for one in contradictions(null) if one.subset != "simulation"]
+    assert sum(compared(null).values()) > 300 and chance(null) < 1.0
+    assert len(apart) <= 4, apart  # chance makes five or more of one expected in 0.4 % of campaigns
+    assert all(abs(one.deviations) < 5.0 for one in apart)
+
+
+def test_a_group_that_contradicts_the_others_is_found(machine, sensors, campaign, found):
+    """Horizontal load cells 4 % high, thirteen stated deviations: the wrench gives another mass than its prior."""
+    high = np.where([name.startswith("H") for name in machine.actuator_names], 1.04, 1.0)
+    wrong = [r.assign(actuator_force=r["actuator_force"] * high) for r in campaign.records]
+    some = calibrate(machine, wrong, sensors)
+    named = {(one.subset, some.names[one.unknown]) for one in contradictions(some)}
+    assert ("wrench, x", "platen.mass[x]") in named
+    assert len(contradictions(some)) > 10 * chance(some) > len(contradictions(found))
 
 
 def test_without_spools_there_is_no_second_opinion(problem):

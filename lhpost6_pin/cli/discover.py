@@ -62,7 +62,7 @@ def discover(
     table = mount.onto_for(bare, tests.records)
     known = find_sensors(table, tests.records, sensors, measuring(campaign, machine))
     held = None if hold_out is None else [] if hold_out == ["none"] else hold_out
-    folder = folder_for(out, f"{tests.name}_discovery")
+    folder = folder_for(out, f"{tests.name}_discovery", "verdict.json", "model.toml", "report.html")
     with progress_bar(f"searching {tests.name} for effects that {table.name} lacks") as progress:
         found = search(table, tests, known, hold_out=held, seed=seed, jobs=jobs, unfinished=folder, progress=progress)
     command_line = repeating_command()

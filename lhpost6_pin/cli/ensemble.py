@@ -84,7 +84,7 @@ def ensemble(
     from ..show.report.ensemble_report import write_ensemble_report
     from ..studies.ensemble import run_ensemble
     from ..studies.plan_file import beside
-    from ..studies.store import open_results
+    from ..studies.store import RESULTS, open_results
     from ..studies.summary import summarise
 
     here = partial(beside, Path.cwd())
@@ -105,7 +105,7 @@ def ensemble(
     processing["match_spectrum"] = None if match_spectrum is None else str(match_spectrum)
     processing = {key: value for key, value in processing.items() if value is not None}
     made = _plan(plan, processing, {key: value for key, value in given.items() if value is not None})
-    folder = opt.folder_for(out, made.name.replace("/", "_"))
+    folder = opt.folder_for(out, made.name.replace("/", "_"), "report.html", own=RESULTS)
     count = len(made.blocks)
     with progress_bar(f"{made.name}: {count} blocks of runs on {made.machine.name}") as progress:
         path = run_ensemble(made, folder, jobs=jobs, dask=dask, progress=progress)

@@ -24,7 +24,10 @@ log = logging.getLogger(__name__)
 LOOP_FACTS = ("loop", "loop_summary", "loop_remedy")
 """Attributes of a record on its control loop; a remedy only where it is not stable."""
 
-__all__ = ["LOOP_FACTS", "checked_loop", "interaction_of", "loop_facts", "retuned"]
+TUNING_FILES = ("controller.toml", "tuning.html")
+"""What `retuned` writes."""
+
+__all__ = ["LOOP_FACTS", "TUNING_FILES", "checked_loop", "interaction_of", "loop_facts", "retuned"]
 
 
 def checked_loop(
@@ -75,7 +78,7 @@ def retuned(
         found = tune(table, settings, progress=progress)
     log.warning("tuned for %s, %s, in %.0f s", table.name, load, time.perf_counter() - start)
     tuned = replace(found.after, name=f"tuned for {table.name}, {load}")
-    files = [folder / name for name in ("controller.toml", "tuning.html")]
+    files = [folder / name for name in TUNING_FILES]
     save_controller(tuned, files[0], f"lhpost6 run --retune on {table.name}, {load}")
     write_tune_report(found, files[1], command=repeating_command())
     return tuned, found, files

@@ -13,7 +13,7 @@ from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import complete_motion
 from .live_view import EndedBySignal, LiveOptions, watched
-from .loop_check import LOOP_FACTS, checked_loop, interaction_of, loop_facts, retuned
+from .loop_check import LOOP_FACTS, TUNING_FILES, checked_loop, interaction_of, loop_facts, retuned
 from .motion_options import MotionOptions
 from .results_folder import RUN_FILES
 
@@ -82,7 +82,8 @@ def run(
     target = motion.target(table, beyond)
     name = target.reference.motion.replace("/", "_")
     leave_out = {file for file, no in (("record.nc", no_record), ("report.html", no_report)) if no}
-    folder = opt.folder_for(out, name, *(file for file in RUN_FILES if file not in leave_out), inputs=motion.files)
+    written = [*(file for file in RUN_FILES if file not in leave_out), *(TUNING_FILES if retune else ())]
+    folder = opt.folder_for(out, name, *written, inputs=motion.files)
     given = chosen
     more: list[Path] = []
     if retune:

@@ -27,11 +27,11 @@ ResumedOut = Annotated[
 ]
 
 
-def folder_for(out: Path | None, name: str, *files: str, inputs: Iterable[Path] = ()) -> Path:
+def folder_for(out: Path | None, name: str, *files: str, inputs: Iterable[Path] = (), own: str = "") -> Path:
     """Directory of the results, out/NAME by default; raises OSError at once if it cannot be written.
 
-    Those of `files`, which the command will write, that are there already are a warning; RecordError for one of its
-    `inputs` among them.
+    Those of `files`, which the command will write, that are there already are a warning, unless a file `own` beside
+    them shows that they are of the same results, which are resumed. RecordError for one of its `inputs` among them.
     """
     folder = out or Path("out") / name
     written = {(folder / file).resolve() for file in files}
@@ -39,7 +39,8 @@ def folder_for(out: Path | None, name: str, *files: str, inputs: Iterable[Path] 
         if path.resolve() in written:
             raise RecordError(f"{path} would be replaced by its own results; choose another directory with --out")
     refuse_folder(folder)
-    if earlier := [file for file in files if (folder / file).exists()]:
+    earlier = [file for file in files if (folder / file).exists()]
+    if earlier and not (own and (folder / own).exists()):
         what = f"{', '.join(earlier[:3])}{f' and {len(earlier) - 3} more' * (len(earlier) > 3)}"
         log.warning("%s: %s of an earlier command will be replaced; --out names another directory", folder, what)
     return folder

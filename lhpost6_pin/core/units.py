@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import NamedTuple
 
-__all__ = ["SI_UNITS", "Unit", "parse_unit", "quantity_unit"]
+__all__ = ["SI_UNITS", "Unit", "parse_unit", "quantity_unit", "units_of"]
 
 _SPELLINGS = {  # by case-folded word; `g` is standard gravity, never gram
     **dict.fromkeys(("g", "gs"), "standard_gravity"),
@@ -58,6 +58,11 @@ def quantity_unit(unit: str | None) -> str | None:
     """SI unit, one of `SI_UNITS`, that `unit` can be converted to; None if there is none."""
     found = parse_unit(unit) if unit else None
     return next((si for si in SI_UNITS if found and (target := parse_unit(si)) and found[1:] == target[1:]), None)
+
+
+def units_of(si: str) -> tuple[str, ...]:
+    """Units with a spelling of their own that can be converted to an SI unit, which comes first."""
+    return (si, *sorted(unit for unit in {*_SPELLINGS.values()} - {si} if quantity_unit(unit) == si))
 
 
 @cache

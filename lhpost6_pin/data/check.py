@@ -21,6 +21,7 @@ from ..machine.recorded_changes import changes_summary
 from .alignment import hydraulic_force
 from .channels import LAYOUT, MOTION, channel_name, channel_unit, columns_of
 from .conditioning import resolution
+from .force_units import wrong_force_units
 from .layout_faults import RecordFinding, layout_faults
 from .records import open_record, sample_interval
 from .signals import differentiate, lowpass_zero_phase
@@ -61,7 +62,7 @@ def check_record(path: Path | str, machine: Machine | None = None) -> list[Recor
     """Contents and faults of the record at `path`; an unreadable file is one error.
 
     With a `machine` the record must be of it; its forces are compared with piston areas times the chamber pressures,
-    and their signs with the acceleration of its mass.
+    their signs with the acceleration of its mass, and their size with its weight and inertia.
     """
     try:
         return check_dataset(open_record(path), machine)
@@ -87,8 +88,10 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
         _inconsistent_forces(sound, machine),
         _floors_without_mass(sound, machine),
     )
-    errors += turned_signs(sound, machine) if machine is not None and not errors else []
-    return errors + [RecordFinding("warning", *warning) for warning in warnings] + contents
+    units: list[RecordFinding] = []
+    if machine is not None and not errors:
+        errors, units = turned_signs(sound, machine), wrong_force_units(sound, machine)
+    return errors + [RecordFinding("warning", *warning) for warning in warnings] + units + contents
 
 
 def _floors_without_mass(dataset: xr.Dataset, machine: Machine | None) -> Iterator[_Warning]:

@@ -275,5 +275,25 @@ def calibration_entries(found: "Calibration") -> Entries:
         "sensors": sensors,
         "misfit": misfits,
         "alike": [{"pair": [a, b], "correlation": c} for a, b, c in found.correlated_pairs()],
+        "subsets": _subset_entries(found),
         "friction": _friction_entries(found),
+    }
+
+
+def _subset_entries(found: "Calibration") -> Entries:
+    """Numbers of subset estimates compared, and those that differ from the joint estimate."""
+    from ..identification.calibration.calibration_summary import chance, compared
+    from ..identification.calibration.result import contradictions
+
+    each = []
+    for one in contradictions(found):
+        alone, joint, unit = one.values(found)
+        entry = {"unknown": found.names[one.unknown], "subset": one.subset, "alone": alone, "joint": joint}
+        each.append({**entry, "unit": unit, "deviations": one.deviations})
+    return {
+        "compared": compared(found) | compared(found, part=False),
+        "limit": found.limit,
+        "simulation_limit": found.numbers.number("simulation.deviations"),
+        "expected_by_chance": chance(found),
+        "contradictions": each,
     }

@@ -5,7 +5,7 @@ import numpy as np
 from .free_parameters import parameter_changes
 from .result import Calibration, contradictions, out_of_range, stated_range
 
-__all__ = ["chance", "contradiction_summary", "convergence_summary", "correlation_summary", "cut_strokes"]
+__all__ = ["chance", "compared", "contradiction_summary", "convergence_summary", "correlation_summary", "cut_strokes"]
 __all__ += ["delay_summary", "friction_summary", "interval_summary", "lacking", "range_summary"]
 
 
@@ -104,7 +104,7 @@ def correlation_summary(calibration: Calibration) -> str:
 
 def contradiction_summary(calibration: Calibration) -> str:
     """How many subset estimates differ from the joint estimate, and how many by chance; empty without subsets."""
-    parts = {s.name: int(np.isfinite(s.sd).sum()) for s in calibration.subsets if s.part}
+    parts = compared(calibration)
     if not parts:
         return ""
     found = [one.subset for one in contradictions(calibration)]
@@ -114,10 +114,8 @@ def contradiction_summary(calibration: Calibration) -> str:
         f"{chance(calibration):.1g}."
     )
     own = calibration.numbers.number("simulation.deviations")
-    for subset in calibration.subsets:
-        if not subset.part:
-            count, other = int(np.isfinite(subset.sd).sum()), found.count(subset.name)
-            text += f" Of {count} estimates by simulation, {other} differ by more than {own:g} sigma."
+    for name, count in compared(calibration, part=False).items():
+        text += f" Of {count} estimates by simulation, {found.count(name)} differ by more than {own:g} sigma."
     return text
 
 
@@ -125,8 +123,12 @@ def chance(calibration: Calibration) -> float:
     """How many subset estimates noise alone makes differ from the joint estimate."""
     from scipy.stats import norm
 
-    compared = sum(int(np.isfinite(s.sd).sum()) for s in calibration.subsets if s.part)
-    return 2.0 * float(norm.sf(calibration.limit)) * compared
+    return 2.0 * float(norm.sf(calibration.limit)) * sum(compared(calibration).values())
+
+
+def compared(calibration: Calibration, part: bool = True) -> dict[str, int]:
+    """How many estimates each subset has, those that are a `part` of the joint estimate, or simulation."""
+    return {s.name: int(np.isfinite(s.sd).sum()) for s in calibration.subsets if s.part == part}
 
 
 def _pairs(count: int) -> str:

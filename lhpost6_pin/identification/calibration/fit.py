@@ -18,7 +18,6 @@ import xarray as xr
 
 from ...core.arrays import Array, Complex, Mask
 from ...core.errors import ParameterError
-from ...core.names import AXES
 from ...core.progress import Progress, between, split
 from ...data.campaign import SkippedTest
 from ...data.sensors import SensorSet
@@ -27,11 +26,12 @@ from ...machine.parameters import Parameters
 from ..residuals import RESIDUALS
 from .curves import measured_curves
 from .friction_forms import compare_friction
-from .normal_equations import NoiseBias, NormalEquations, bounded_step, positive
+from .normal_equations import NoiseBias, NormalEquations, bounded_step
 from .prepare import prepare_problem
 from .problem import OperatingPoint, Problem
-from .result import Calibration, Subset, calibration_numbers
+from .result import Calibration, calibration_numbers
 from .simulated_residuals import by_simulation
+from .subset_estimates import subset_estimates
 from .whitened_residuals import mean_squares, negative_log_likelihood
 
 __all__ = ["Solution", "calibrate", "misfit", "objective", "objective_at", "solve"]
@@ -87,7 +87,7 @@ def calibrate(
         estimate=found.x,
         covariance=np.asarray(np.linalg.inv(normal.posterior(problem.prior)) + np.diag(floor**2), np.float64),
         alone=np.hypot(normal.alone(problem.prior), floor),
-        subsets=(*_subsets(problem, normal, found.at, floor, numbers), *([simulated] if simulated else [])),
+        subsets=(*subset_estimates(problem, normal, found.at, floor, numbers), *([simulated] if simulated else [])),
         misfit_before=found.misfit_before,
         misfit_after=misfit(problem, found.residual),
         rounds=found.rounds,
@@ -228,28 +228,3 @@ def misfit(problem: Problem, whitened: Sequence[Complex]) -> Array:
             if rows.any():
                 out[t, k] = np.mean(np.abs(bins[:, rows]) ** 2)
     return out
-
-
-def _subsets(
-    problem: Problem, normal: NormalEquations, x: Array, floor: Array, numbers: Parameters
-) -> tuple[Subset, ...]:
-    """Estimates from the wrench along each axis, flows of each kind of actuator, and gas law alone, about x (p,).
-
-    Whitening mixes columns with those before them; by the order of `RESIDUALS`, wrench and flow depend on no others.
-    """
-    groups = [(f"wrench, {axis}", problem.rows("wrench", k)) for k, axis in enumerate(AXES)]
-    flow, kinds = problem.rows("flow"), [a.kind for a in problem.machine.actuators]
-    for kind in dict.fromkeys(kinds):
-        own = [problem.rows_of_actuator(i) for i, k in enumerate(kinds) if k == kind]
-        groups.append((f"flow, {kind}", flow & np.any(own, axis=0)))
-    groups.append(("gas law", problem.rows("gas")))
-    found = []
-    for name, columns in groups:
-        if columns.any():
-            h, g = normal.of(range(len(normal.residual)), columns)
-            covariance = np.linalg.inv(positive(h, problem.prior) + np.diag(problem.prior**-2.0))
-            sd = np.sqrt(np.diag(covariance))
-            estimate = x - covariance @ (g + x / problem.prior**2)
-            known = sd < numbers.number("report.informative") * problem.prior
-            found.append(Subset(name, np.where(known, estimate, np.nan), np.where(known, np.hypot(sd, floor), np.nan)))
-    return tuple(found)

@@ -97,10 +97,18 @@ class NormalEquations:
         for t in tests:
             matrix += self.rows[t].squares(np.sqrt(self.power[t]), columns)
             right += _dot(self.rows[t], self.residual[t], self.power[t], columns)
-            if self.bias is not None:
+        more, side = self.correction(tests, columns)
+        return matrix - more, right - side
+
+    def correction(self, tests: Sequence[int], columns: Mask | None = None) -> tuple[Array, Array]:
+        """Contributions of noise to matrix (p, p) and right side (p,), which `of` subtracts; zero if not corrected."""
+        count = len(self.slope[0])
+        matrix, right = np.zeros((count, count)), np.zeros(count)
+        if self.bias is not None:
+            for t in tests:
                 more, side = self.bias.of(t, columns, self.power[t])
-                matrix -= more
-                right -= side
+                matrix += more
+                right += side
         return matrix, right
 
     @cached_property

@@ -192,6 +192,15 @@ class Contradiction(NamedTuple):
     unknown: int
     deviations: float  # signed difference over its standard deviation
 
+    def values(self, calibration: "Calibration") -> tuple[float, float, str]:
+        """Estimates of the unknown, by the subset and jointly, and their unit."""
+        subset = next(one for one in calibration.subsets if one.name == self.subset)
+        alone, joint = (float(x[self.unknown]) for x in (subset.estimate, calibration.estimate))
+        if self.unknown >= len(calibration.parameters):
+            return alone, joint, calibration.unknowns[self.unknown - len(calibration.parameters)].unit
+        parameter = calibration.parameters[self.unknown]
+        return parameter.at(alone), parameter.at(joint), parameter.unit
+
 
 def contradictions(calibration: Calibration) -> list[Contradiction]:
     """Subset estimates that differ from the joint ones by more than the limit, largest difference first.

@@ -165,14 +165,9 @@ def group_blocks(calibration: Calibration) -> list[Block]:
     found = contradictions(calibration)
     rows = []
     for one in found:
-        i = one.unknown
-        subset = next(s for s in calibration.subsets if s.name == one.subset)
-        values, name = [float(x[i]) for x in (subset.estimate, calibration.estimate)], calibration.names[i]
-        if i < len(calibration.parameters):
-            values, unit = list(map(calibration.parameters[i].at, values)), calibration.parameters[i].unit
-        else:
-            unit = calibration.unknowns[i - len(calibration.parameters)].unit
-        rows.append((name, one.subset, *map(_plain, values), unit, number(one.deviations, 2)))
+        alone, joint, unit = one.values(calibration)
+        name = calibration.names[one.unknown]
+        rows.append((name, one.subset, _plain(alone), _plain(joint), unit, number(one.deviations, 2)))
     how = (
         f"{contradiction_summary(calibration)} Many more than expected by chance indicate an incomplete equation. "
         "Noise shared by residuals is removed in the order wrench, flow, gas law, force: later groups contain a "

@@ -159,5 +159,5 @@ def _raw_of_columns(
             unit = time_unit(names[clocks[0]], units[clocks[0]]) or units[clocks[0]] or "s"
             time = values[:, clocks[0]] * si_factor(unit, "s")
     rest = [k for k in range(len(names)) if k not in clocks]
-    some, own = [names[k] for k in rest], [units[k] for k in rest]
-    return make_raw(source, form, some, own, values[:, rest], time, facts, numbers=[k + 1 for k in rest])
+    channels = [names[k] for k in rest], [units[k] for k in rest]
+    return make_raw(source, form, *channels, values[:, rest], time, facts, numbers=[k + 1 for k in rest])

@@ -247,6 +247,19 @@ def test_run_does_what_its_options_say(lhpost6, tmp_path, brief, options, attrib
     assert {name: record.attrs[name] for name in attributes} == attributes
 
 
+def test_the_rate_of_the_record_changes_neither_errors_nor_peaks_nor_the_verdict(lhpost6, tmp_path):
+    """At 16 samples a second the record itself cannot even show the motion's peaks."""
+    told = []
+    for rate in ("2048", "16"):
+        ended = lhpost6("run", *SHORT, "--rate", "2048", "--record-rate", rate, "--json", "--out", rate)
+        assert ended.code == 0
+        told.append(json.loads(ended.out))
+        assert sound(tmp_path / rate).attrs["sample_rate_hz"] == float(rate)
+    for entries in told:
+        del entries["files"]
+    assert told[0] == told[1] and told[0]["tracking"]
+
+
 def test_run_moves_the_axes_asked_for_on_the_machine_with_its_override(lhpost6, tmp_path):
     (tmp_path / "mine.toml").write_text('[hydraulics]\nsupply_pressure = { value = 19.5e6, unit = "Pa" }\n')
     assert lhpost6("run", *COARSE, "--axes", "y=x", "--override", "mine.toml", "--out", "here").code == 0

@@ -133,6 +133,13 @@ def test_a_tuning_that_follows_with_margin_is_good_and_shows_what_changed(tmp_pa
         ({"band_after": (0.0625, 19.0)}, "attention", "Not all axes are within 3 dB"),
         ({"band_after": (0.25, 40.0)}, "attention", "x 0.25 to 40.0\N{NO-BREAK SPACE}Hz"),
         ({"band_after": (np.nan, np.nan), "limited_by": ""}, "bad", "x no band"),
+        (
+            {"band_before": (0.0625, 40.0), "margin_before": Margin(19.3, 45.0, 1.51, 1.0)},
+            "attention",
+            "Worse than before in x: gain margin 25.7 dB before, 12.0 dB after; phase margin 87 deg before, 57 deg",
+        ),
+        ({"band_before": (0.0625, 60.0)}, "attention", "Worse than before in x: band 0.062 to 60 Hz before,"),
+        ({"band_before": (0.0625, 40.0)}, "attention", "gain margin unlimited before, 12.0 dB after"),
     ],
 )
 def test_a_tuning_that_falls_short_says_where(tmp_path, machine, settings, changes, level, said):
@@ -140,6 +147,18 @@ def test_a_tuning_that_falls_short_says_where(tmp_path, machine, settings, chang
     assert Reader(page).verdict[0] == level
     assert said in Reader(page).verdict[1]
     assert not NO_NUMBER.search(Reader(page).words)
+
+
+def test_a_margin_that_pays_for_a_wider_band_or_hardly_changes_is_no_loss(machine, settings):
+    """Before: no band at all, a narrower band, or margins as after within what is judged a loss."""
+    known = {"margin_before": Margin(19.3, 45.0, 1.51, 1.0)}
+    for changes in ({}, known, {**known, "band_before": (0.0625, 30.0)}):
+        tuning = make_tuning(machine, settings, **changes)
+        assert tuning.axes[0].worse == () and tuning_entries(tuning)["axes"]["x"]["worse"] == ()
+    near = {"band_before": (0.0625, 41.0), "margin_before": Margin(4.2, 48.0, 1.02, 5.0)}
+    assert make_tuning(machine, settings, **near).axes[0].worse == ()
+    both = {"band_before": (0.0625, 40.0), "margin_after": Margin(np.inf, np.nan, np.inf, np.nan)}
+    assert make_tuning(machine, settings, **both).axes[0].worse == ()
 
 
 def test_settings_that_were_unstable_before_are_called_so_and_have_no_curve(tmp_path, machine, settings):

@@ -16,6 +16,7 @@ from lhpost6_pin.core.errors import ParameterError
 from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.effects.registry import parameters_of
 from lhpost6_pin.identification.calibration.free_parameters import machine_parameters
+from lhpost6_pin.laws.orifice import opening
 from lhpost6_pin.machine.draft.asked import ASKED, read_answers
 from lhpost6_pin.machine.draft.draft import draft_machine
 from lhpost6_pin.machine.draft.stated import read_stated
@@ -75,7 +76,11 @@ def test_a_number_that_cannot_be_read_is_refused_with_its_name(text, words):
         ({"mass": None}, "--mass is missing"),
         ({"area": None}, "--area is missing.* or --bore and --rod"),
         ({"mass": "-3 kg"}, "must be positive"),
-        ({"size": "3 m"}, r"should be 2 number"),
+        ({"size": "3 m"}, r"should be 2 number.*, as in '2 3 m'"),
+        ({"size": "2 m, 3 ft"}, r"more than one unit; .*, as in '2 3 m'"),
+        ({"size": "2 kg, 3 kg"}, r"cannot be converted.*, as in '2 3 m'"),
+        ({"size": "2 by 3"}, r"--size: .*, as in '2 3 m'"),
+        ({"size": "2 3"}, r"has no unit; write it, as in '2 3 m'"),
         ({"speed": "0.4 m/s/V"}, "with --voltage"),
         ({"supply_pressure": "0.1 MPa"}, "--return-pressure is not below"),
         ({"mass": "1 2 t"}, "--mass: 2 numbers for the axes x"),
@@ -99,6 +104,37 @@ def test_a_speed_per_volt_is_the_valves_slope_without_load():
     (row,) = plant.rows[plant.tables.actuators]
     per_opening, _ = unloaded_speeds(parameters_of(row), 0.0, plant.supply)
     assert per_opening * machine.actuators[0].flow_curve / 10.0 == pytest.approx(0.37, rel=1e-5)  # six digits in a file
+
+
+def test_a_speed_per_volt_and_one_at_full_command_are_told_apart(capsys, tmp_path):
+    """The limit of velocity is the share of the flow curve at full opening over its slope at null, and says so."""
+    machine = draft_machine("small", read_answers(SMALL, 10.0))
+    curve = machine.actuators[0].flow_curve
+    share = opening(1.0, curve) / curve
+    assert machine.limits.velocity[0] == pytest.approx(share * 3.7, rel=3e-3) and share < 0.97  # three digits
+    source = machine.parameters["limits.velocity"].source
+    assert f"by the assumed flow curve {share:.3g} of the 3.7 m/s of a straight one" in source
+    assert "slope at null, times 10 V" in machine.parameters["drive.flow"].source
+    print_draft(machine, tmp_path / "small.toml")
+    assert source in " ".join(capsys.readouterr().out.split())
+    whole = draft_machine("it", read_answers({**SMALL, "speed": "3.7 m/s"}, 10.0))
+    assert whole.limits.velocity[0] == 3.7 and "straight" not in whole.parameters["limits.velocity"].source
+    assert "slope at null" in ASKED["speed"].question
+
+
+@pytest.mark.parametrize("text", ["2 3 m", "2, 3 m", "2 x 3 m", "2x3 m", "2 m, 3 m", "2 m x 3 m", "2m;3m", "[2, 3] m"])
+def test_a_size_may_be_written_in_any_usual_way(text):
+    assert read_answers({**KNOWN, "size": text})["size"].value == (2.0, 3.0)
+    with_sd = read_answers({**KNOWN, "size": f"{text} +- 10 %"})["size"]
+    assert with_sd.value == (2.0, 3.0) and with_sd.sd == pytest.approx((0.2, 0.3))
+
+
+def test_examples_of_answers_are_in_the_questions_and_can_be_read():
+    for name, asked in ASKED.items():
+        assert bool(asked.example) == (min(asked.sizes) > 1)
+        assert asked.example in asked.question
+        if asked.example:
+            assert len(read_answers({**KNOWN, name: asked.example})[name].value) in asked.sizes
 
 
 @pytest.mark.parametrize("cylinder", ["double-rod", "single-rod"])

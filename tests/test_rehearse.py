@@ -9,7 +9,7 @@ from machine_cases import DATA, PENDULUM, machine_named
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import OutOfRangeError, ParameterError, RecordError, SimulationError
 from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE
-from lhpost6_pin.data.records import load_record
+from lhpost6_pin.data.records import load_record, thinned
 from lhpost6_pin.data.signals import rrmse
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
@@ -120,6 +120,9 @@ def test_the_record_is_thinned_without_touching_the_simulation(rehearsed):
     assert thin.record.attrs["sample_rate_hz"] == 128
     for name in ("platen_displacement", "chamber_pressure_a", "spool_command", "reference_acceleration"):
         assert np.array_equal(thin.record[name].values, rehearsed.record[name].values[::16])
+    assert thinned(rehearsed.record, 16).identical(thin.record)  # the same afterwards
+    few = rehearsed.record.isel(time=slice(0, 10))
+    assert thinned(few, 16).identical(few)  # a record needs two samples
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -278,6 +278,14 @@ REFUSED = {
     "twice": (MASS + changed(MATRICES, '"2F"', '"1F"'), r"own\.toml: two points are named '1F'"),
     "rotation": (MASS + changed(MATRICES, '"x"', '"ry"'), r"own\.toml: matrices: mass in t; with rotations .* in SI"),
     "ratio": (MASS + changed(MATRICES, "[0.02]", "[0.02, 0.02, 0.02]"), r"own\.toml: matrices: damping_ratio has 3"),
+    "modal per cent": (
+        MASS + MODES.replace("0.02", "2"),
+        r"own\.toml: modes\.damping: 2 of critical damping; .*unit = '%'",
+    ),
+    "per cent": (
+        MASS + changed(MATRICES, "[0.02]", "[2]"),
+        r"own\.toml: matrices\.damping_ratio: 2 of critical damping; .*unit = '%'",
+    ),
     "below all": (
         MASS + changed(MATRICES, "damping_ratio", 'highest_frequency = { value = 1, unit = "Hz" }\ndamping_ratio'),
         r"own\.toml: matrices: highest_frequency 1 Hz is below all modes, the first of 3\.478 Hz",
@@ -294,6 +302,23 @@ def test_a_wrong_file_is_refused_with_file_and_entry(case, tmp_path):
     text, message = REFUSED[case]
     with pytest.raises(ParameterError, match=message):
         read_specimen(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("text", "entry"),
+    [
+        (MASS + MODES.replace("0.02", "0.4"), "modes.damping"),
+        (MASS + changed(MATRICES, "[0.02]", "[0.4]"), "matrices.damping_ratio"),
+    ],
+)
+def test_damping_beyond_that_of_structures_is_warned_of_and_per_cent_are_read(text, entry, tmp_path, caplog):
+    as_ratio = read_specimen(written(tmp_path, text.replace("0.4", "0.3")))
+    in_per_cent = text.replace("0.4", "30").replace('unit = "1" }', 'unit = "%" }', 1)
+    modes = read_specimen(written(tmp_path, in_per_cent)).modes
+    assert np.allclose(modes.damping, as_ratio.modes.damping, rtol=1e-12) and not caplog.messages
+    read_specimen(written(tmp_path, text))
+    (said,) = caplog.messages
+    assert f"own.toml: {entry}: 0.4 of critical damping" in said and "unit = '%'" in said
 
 
 @pytest.mark.parametrize("name", ["broken.npz", "broken.mat"])

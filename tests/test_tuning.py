@@ -14,11 +14,14 @@ from lhpost6_pin.control import controlled, load_controller
 from lhpost6_pin.core.errors import SimulationError
 from lhpost6_pin.data.transfer import Transfer
 from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.tuning import identify
 from lhpost6_pin.tuning import tune as tuning
 from lhpost6_pin.tuning.bandwidth import bandwidth_limitation
+from lhpost6_pin.tuning.feedback_search import with_gains
 from lhpost6_pin.tuning.feedforward_fit import FeedforwardFit
 from lhpost6_pin.tuning.identify import noise_target, tuning_numbers
+from lhpost6_pin.tuning.margins import margins
 from lhpost6_pin.tuning.tune import stays_stable, tune
 
 pytestmark = pytest.mark.long
@@ -118,6 +121,27 @@ def test_a_panel_with_velocity_and_acceleration_feedback_is_fitted_exactly():
     seen = Transfer(frequency, response[:, None, None], np.ones((200, 1)))
     fit = FeedforwardFit(seen, settings, 0, ((0.5, 5.0), (0.5, 33.0)), (1, 2))
     np.testing.assert_allclose(fit.plant, plant, rtol=1e-12)
+
+
+@pytest.mark.parametrize("start", ["lhpost6", "untuned"])
+def test_a_light_specimen_costs_no_axis_its_displacement_gain(start):
+    """0.7 t on the platen's 257 t: neither Kx nor KF of roll can be raised alone, and both can.
+
+    Margins of the bare table's settings are the yardstick, to what `AxisTuning.worse` judges a loss.
+    """
+    plant, shipped = make_plant(load_machine().with_specimen(PENDULUM, locked=True)), load_controller("lhpost6")
+    job = tuning._Job(plant, load_controller(start), lambda share: None)
+    tuned = job.search.raised(job.search.lowest(load_controller(start)))
+    growth = tuning_numbers().number("feedback_targets.growth")
+    assert min(tuned.displacement_gain) > max(shipped.displacement_gain) / growth
+    before, after = (margins(job.model, job.controller(s)) for s in (shipped, tuned))
+    for old, new in zip(before, after, strict=True):
+        assert new.gain > old.gain / 1.12 and new.phase > old.phase - np.radians(5.0)
+    reasons = [job.search.limits(tuned, a) for a in range(6)]
+    assert all("beyond 0.1 of the slowest oil column" in of_gain for of_gain, _ in reasons)
+    assert "at most 2" in reasons[0][1] and "sensitivity" in reasons[3][1] and "beyond 2" in reasons[3][1]
+    wide = with_gains(tuned, 3, force_damping=2.0 * tuned.force_damping[3])
+    assert "in roll at" in job.search._refusal(wide, 3)
 
 
 def test_a_machine_that_no_gain_can_hold_is_refused():

@@ -127,6 +127,21 @@ def test_a_computer_too_slow_for_every_pixel_draws_fewer_while_the_table_moves(p
     assert seen["fast"] == seen["steady"] == seen["paused"] == 1
 
 
+def test_long_labels_of_the_legend_stay_within_its_box(machine, record, tmp_path):
+    other = record.assign_attrs(title="a long name of a motion at scale 0.8 on LHPOST6, simulated once more")
+    path = tmp_path / "long.html"
+    show_record(machine, record, [other]).save(path)
+    rights = "(...of) => Math.max(...of.map((e) => e.getBoundingClientRect().right))"
+
+    async def look(tab: Tab):
+        await tab.evaluate(DRAWN)
+        box = await tab.evaluate(f"({rights})(document.querySelector('#caption'))")
+        return box, await tab.evaluate(f"({rights})(...document.querySelectorAll('#caption .kind'))")
+
+    box, labels = browse(tmp_path, path.as_uri(), look)
+    assert 0.5 * box < labels < box
+
+
 def test_a_narrow_window_sees_the_whole_table(page, tmp_path):
     async def look(tab: Tab):
         await tab.evaluate(f"viewer.animator.pause(), seek(0), {DRAWN}")

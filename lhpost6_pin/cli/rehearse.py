@@ -50,7 +50,10 @@ def run(
         bool, typer.Option("--retune", help="Tune the controller for this table and specimen first, then run with it.")
     ] = False,
     beyond: opt.Beyond = False,
-    record_rate: Annotated[int, typer.Option(help="Samples per second of the record, a divisor of 2048.")] = 2048,
+    record_rate: Annotated[
+        int,
+        typer.Option(help="Samples per second of the record, a divisor of 2048; the report has all samples."),
+    ] = 2048,
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no record (1 MB a second).")] = False,
     no_report: Annotated[bool, typer.Option("--no-report", help="Write no report.")] = False,
     json: opt.Json = False,
@@ -106,7 +109,6 @@ def run(
             attrs={"test": name, "title": title, **loop_facts(loop, machine)},
             inverse=inverse,
             adapt=_canceller(cancel, target),
-            record_every=SAMPLE_RATE // record_rate,
             beyond_limits=True,
             progress=progress,
             watch=watch,
@@ -114,7 +116,8 @@ def run(
             **options,
         )
     shown = interaction_of(table, given, chosen, inverse)
-    save_run(test, folder, json, interaction=shown, more=more, leave_out=leave_out)
+    every = SAMPLE_RATE // record_rate
+    save_run(test, folder, json, interaction=shown, more=more, leave_out=leave_out, record_every=every)
 
 
 def _canceller(cancel: str | None, target: "Target") -> "Callable[[ClosedLoop | PluggedLoop], ClosedLoop] | None":
@@ -220,15 +223,17 @@ def save_run(
     interaction: "Interaction | None" = None,
     more: Sequence[Path] = (),
     leave_out: Collection[str] = (),
+    record_every: int = 1,
 ) -> None:
     """Write the record and the report, a comparison if it is `against` a measured test; print a summary.
 
     interaction: of table and specimen, for the report; more: files that were written before; leave_out: those of
-    `RUN_FILES` that are not written.
+    `RUN_FILES` that are not written; record_every: the file of the record keeps every such sample. Report and summary
+    are of all.
 
     Raises typer.Exit if the run stopped on the way.
     """
-    from ..data.records import save_record
+    from ..data.records import save_record, thinned
     from ..data.replay_comparison import compare
     from ..show.report.open_loop_report import write_open_loop_report
     from ..show.results import run_entries
@@ -239,7 +244,7 @@ def save_run(
     files, summary = [*more, *(folder / file for file in RUN_FILES if file not in leave_out)], None
     path = None if RUN_FILES[1] in leave_out else files[-1]
     if RUN_FILES[0] not in leave_out:
-        save_record(record, folder / RUN_FILES[0], single=True)
+        save_record(thinned(record, record_every), folder / RUN_FILES[0], single=True)
     remarks = run_remarks(done)
     for remark in remarks:
         log.warning("%s", remark)

@@ -38,6 +38,7 @@ __all__ = [
     "require",
     "sample_interval",
     "save_record",
+    "thinned",
 ]
 
 STEPS: Mapping[int, Callable[[xr.Dataset], xr.Dataset]] = {}
@@ -176,6 +177,15 @@ def make_record(
     record.attrs |= dict(attrs) | {"layout_version": LAYOUT_VERSION}
     _refuse(layout_faults(record), "record")
     return record
+
+
+def thinned(record: xr.Dataset, every: int) -> xr.Dataset:
+    """Every `every`-th sample of a record, unfiltered; all samples of one too short to keep two."""
+    if every == 1 or record.sizes["time"] <= every:
+        return record
+    kept = record.isel(time=slice(None, None, every))
+    kept.attrs["sample_rate_hz"] = float(f"{sampling_rate(kept['time'].values):.9g}")
+    return kept
 
 
 def _variable(dims: Any, values: ArrayLike, attrs: Mapping[str, Any] | None = None) -> xr.Variable:

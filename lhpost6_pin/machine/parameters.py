@@ -151,10 +151,10 @@ def _overridden(
             raise _unknown_parameter(key, (*quantities, *words))
         replaced.setdefault(key, base)
         quantities[key] = _changed(base, entry, key, origin)
-        if not isinstance(entry, Mapping | Quantity):
-            _doubt_unit(key, quantities[key].value, base)
         if in_a_file and base.unit != "1" and not (isinstance(entry, Mapping) and "unit" in entry):
             raise ParameterError(f"{key}: has no unit; write {{ value = ..., unit = '{base.unit}' }}")
+        if not isinstance(entry, Mapping | Quantity):
+            _doubt_unit(key, quantities[key].value, base)
     origins = f"{parameters.origin.removesuffix(f' + {origin}')} + {origin}"
     return Parameters(quantities, words, origins, effects, replaced)
 

@@ -7,6 +7,7 @@
 [joint.N]   stiffness, damping, rest                in the file beside a URDF: springs of its joints
 """
 
+import logging
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,8 @@ from .specimen_forms import (
 )
 from .specimen_matrices import Matrices, modes_of
 
+log = logging.getLogger(__name__)
+
 __all__ = ["array_file_of", "read_joint_springs", "read_specimen"]
 
 _SECTIONS = {
@@ -46,6 +49,10 @@ _IN_JOINT = ("stiffness", "damping", "rest")
 _VARIABLES = {"mass": "M", "stiffness": "K", "damping": "C", "influence": "R"}
 """Names of variables in a file of matrices without TOML."""
 _UNITS = {"mass": "kg", "stiffness": "N/m", "damping": "N s/m"}
+
+# Judgement, not physics: beyond critical damping no mode swings, and a ratio is one in per cent, or of a dashpot that
+# belongs in [matrices] damping; structures with added dampers reach 0.3.
+_CRITICAL, _USUAL = 1.0, 0.3
 
 
 def read_specimen(path: Path) -> SpecimenContents:
@@ -165,6 +172,7 @@ def _modes(entries: Mapping[str, Any], points: Any, path: Path) -> Modes:
         )
     if frequency.min() <= 0.0 or ratio.min() < 0.0:
         raise ParameterError(f"{where}: frequency should be positive and damping zero or positive")
+    _check_ratio(ratio, f"{where}.damping")
     shape = np.zeros((len(points), n))
     for k, table in enumerate(points):
         row = read_entry(table, "shape", "1/sqrt(kg)", 1, arrays, f"{path}: point {k + 1}")
@@ -204,8 +212,23 @@ def _matrices(entries: Mapping[str, Any], points: tuple[Point, ...], path: Path)
     ratio = read_entry(entries, "damping_ratio", "1", 1, arrays, where) if "damping_ratio" in entries else None
     if ratio is not None and ratio.min() < 0.0:
         raise ParameterError(f"{where}: damping_ratio should be zero or positive")
+    if ratio is not None:
+        _check_ratio(ratio, f"{where}.damping_ratio")
     highest = 2.0 * np.pi * _number(entries, "highest_frequency", "Hz", where, default=np.inf)
     return Matrices(read["mass"], read["stiffness"], read.get("damping"), influence, ratio), highest
+
+
+def _check_ratio(ratio: Array, where: str) -> None:
+    """Raise ParameterError for damping beyond critical; log a warning of more than structures have."""
+    largest = float(ratio.max())
+    if largest > _CRITICAL:
+        raise ParameterError(
+            f"{where}: {largest:g} of critical damping; it is a ratio, so write 2 per cent as 0.02, or with unit = '%'"
+        )
+    if largest > _USUAL:
+        log.warning(
+            "%s: %g of critical damping, more than structures have; is it in per cent? (unit = '%%')", where, largest
+        )
 
 
 def _arrays(entries: Mapping[str, Any], path: Path) -> dict[str, Array]:

@@ -60,6 +60,7 @@ def print_draft(machine: Machine, path: Path) -> None:
         f"{machine.name}: {machine.title}",
         f"numbers: {known}; the assumed ones are marked in `lhpost6 info --machine {path}`",
         Table("Limits that follow", ("axis", "displacement", "velocity", "acceleration"), rows),
+        f"velocity: {machine.parameters['limits.velocity'].source}",
     )
     print_modes(machine)
     print_blocks(f"tune its controller: lhpost6 tune --machine {path}")

@@ -23,12 +23,13 @@ from ..mechanics.interface_wrench import bare
 from ..mechanics.linearize import SPOOL_STEP, linearize
 from ..mechanics.plant import make_plant
 
-__all__ = ["LinearTable", "LoopModel", "Margin", "expected_response", "linear_table", "loop_gain"]
-__all__ += ["make_loop_model", "margins", "without_dry_friction"]
+__all__ = ["LinearTable", "LoopModel", "Margin", "expected_response", "linear_table", "loop_frequencies"]
+__all__ += ["loop_gain", "make_loop_model", "margins", "without_dry_friction"]
 
-FREQUENCIES = np.geomspace(0.05, 400.0, 4000)
-"""Frequencies of loops [Hz]: from below the corner of the reset integrator to far above the stiffest oil column, dense
-enough for a resonance of 0.5 % damping."""
+BAND = 0.05, 400.0
+"""Of loops [Hz]: from below the corner of the reset integrator to far above the stiffest oil column."""
+FREQUENCIES = np.geomspace(*BAND, 4000)
+"""Frequencies of loops [Hz], dense enough for a resonance of 0.5 % damping; `loop_frequencies` for less."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,19 @@ def linear_table(controller: Controller) -> LinearTable:
             if name in pressure:
                 to_force[i, 2 * nv + pressure[name]] = area
     return LinearTable(a, b, nv, to_c, to_force)
+
+
+def loop_frequencies(rates: Complex, count: int = 600, near: int = 41) -> Array:
+    """Frequencies [Hz] for margins: a geometric grid of `count`, with `near` more about the resonance of every rate.
+
+    rates (n,): of the motions exp(s t) of table or closed loop [1/s]; those not finite or outside the grid have none.
+    The finest step is 0.015 % of a resonance's frequency with 41 near it, 0.0037 % with 161.
+    """
+    rates = rates[np.isfinite(rates)]
+    rates = rates[(rates.imag > 2.0 * np.pi * BAND[0]) & (rates.imag < 2.0 * np.pi * BAND[1])]
+    spread = 1.0 + np.sinh(np.linspace(-6.0, 6.0, near)) / np.sinh(6.0) * 0.1
+    grid = np.unique(np.concatenate([np.geomspace(*BAND, count), np.outer(rates.imag / (2.0 * np.pi), spread).ravel()]))
+    return np.asarray(grid[(grid >= BAND[0]) & (grid <= BAND[1])])
 
 
 def make_loop_model(

@@ -17,7 +17,7 @@ from ..core.arrays import Array
 from ..core.names import AXES, SAMPLE_RATE
 from ..mechanics.specimen_modes import specimen_growth
 from .identify import section, tuning_numbers
-from .margins import LinearTable, Margin, linear_table, make_loop_model, margins
+from .margins import LinearTable, Margin, linear_table, loop_frequencies, make_loop_model, margins
 
 __all__ = ["LoopCheck", "check_loop", "closed_loop", "closed_loop_rates"]
 
@@ -94,7 +94,8 @@ def check_loop(controller: Controller, table: LinearTable | None = None) -> Loop
     worst = int(np.argmax(rates.real))
     moved = np.abs(table.to_c @ shapes[: len(table.a), worst])
     lever = np.where(np.isin(axes, AXES[3:]), float(np.linalg.norm(controller.plant.machine.platen.size)) / 2.0, 1.0)
-    model = make_loop_model(controller, _frequencies(table, rates), table)
+    resonances = np.concatenate([np.linalg.eigvals(table.a), rates])
+    model = make_loop_model(controller, loop_frequencies(resonances), table)
     return LoopCheck(
         growth=float(rates[worst].real),
         growth_frequency=float(abs(rates[worst].imag) / (2.0 * np.pi)),
@@ -164,15 +165,3 @@ def _held(a: Array, b: Array, t: float) -> Array:
     """Integral of exp(a s) b over s from 0 to t."""
     n, m = b.shape
     return np.asarray(expm(t * np.block([[a, b], [np.zeros((m, n + m))]]))[:n, n:])
-
-
-def _frequencies(table: LinearTable, rates: Array) -> Array:
-    """Frequencies [Hz] for margins: a geometric grid, denser about resonances of table and closed loop."""
-    low, high = 0.05, 400.0
-    open_rates = np.linalg.eigvals(table.a)
-    both = np.concatenate([open_rates, rates[np.isfinite(rates)]])
-    both = both[(both.imag > 2.0 * np.pi * low) & (both.imag < 2.0 * np.pi * high)]
-    spread = np.sinh(np.linspace(-6.0, 6.0, 41)) / np.sinh(6.0) * 0.1
-    near = np.concatenate([np.abs(s.imag) * (1.0 + spread) / (2.0 * np.pi) for s in both] or [np.zeros(0)])
-    grid = np.unique(np.concatenate([np.geomspace(low, high, 600), near]))
-    return np.asarray(grid[(grid >= low) & (grid <= high)])

@@ -2,8 +2,8 @@
 
 In the order of the real table's tuning notes, per degree of freedom: displacement gain Kx, force feedback KF, velocity
 feed-forward Kvf, jerk feed-forward Kjf, both repeated, acceleration feed-forward Kaf. Feedback gains are raised on the
-linear model (`margins`) up to the limits of gain margin, phase margin and sensitivity. Feed-forward is fitted to the
-response measured under white noise (`identify`). With a given feedback
+linear model (`margins`, `feedback_search`) up to the limits of gain margin, phase margin and sensitivity. Feed-forward
+is fitted to the response measured under white noise (`identify`). With a given feedback
 
     T = G (Kxf + Kvf s + Kaf s^2 + Kjf s^3 + Kx + Kv s + Ka s^2),
 
@@ -13,7 +13,7 @@ error, so that they stay synchronous.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,11 +30,26 @@ from ..mechanics.plant import Plant, make_plant
 from ..motions import Target
 from ..simulation.simulate import ClosedLoop, fastest_engine, simulate
 from .bandwidth import bandwidth_limitation
+from .feedback_search import FeedbackSearch, with_gains
 from .feedforward_fit import FEEDFORWARD, FeedforwardFit, best_delay
 from .identify import identify_axes, noise_target, section, tuning_numbers
-from .margins import LoopModel, Margin, expected_response, loop_gain, make_loop_model, margins, without_dry_friction
+from .margins import (
+    LoopModel,
+    Margin,
+    expected_response,
+    linear_table,
+    loop_frequencies,
+    make_loop_model,
+    margins,
+    without_dry_friction,
+)
 
 __all__ = ["AxisTuning", "Tuning", "TuningStep", "stays_stable", "tune"]
+
+# Judgement, not physics: from which loss on an axis is worse than before. A band counts as changed by a tenth, which
+# is beyond the scatter of its measured end; a margin that pays for a wider band is no loss.
+_BAND_LOST = 0.1  # of an end of the band
+_GAIN_LOST, _PHASE_LOST = 1.0, 5.0  # of margins [dB], [deg]
 
 
 class TuningStep(NamedTuple):
@@ -62,6 +77,30 @@ class AxisTuning:
     margin_after: Margin
     limited_by: str  # bandwidth limitation
     doubt: str = ""  # what in the run behind `after` was not linear: clipped commands, empty chambers
+
+    @property
+    def worse(self) -> tuple[str, ...]:
+        """What is worse after the tuning than before, a phrase each: band, gain margin, phase margin."""
+        (low, high), (low_now, high_now) = self.band_before, self.band_after
+        found = []
+        if np.isfinite(high) and not (high_now > (1.0 - _BAND_LOST) * high and low_now < (1.0 + _BAND_LOST) * low):
+            now = f"{low_now:.2g} to {high_now:.3g} Hz" if np.isfinite(high_now) else "no band"
+            found.append(f"band {low:.2g} to {high:.3g} Hz before, {now} after")
+        if np.isfinite(high_now) and not high_now < (1.0 + _BAND_LOST) * high:  # or none before
+            return tuple(found)
+        before, after = self.margin_before, self.margin_after
+        with np.errstate(invalid="ignore"):  # infinite margins both before and after are no loss
+            gains, phases = 20.0 * np.log10([before.gain, after.gain]), np.degrees([before.phase, after.phase])
+            lost = gains[0] - gains[1] > _GAIN_LOST, phases[0] - phases[1] > _PHASE_LOST
+        if lost[0]:
+            found.append(f"gain margin {_finite(gains[0], '.1f', 'dB')} before, {gains[1]:.1f} dB after")
+        if lost[1]:
+            found.append(f"phase margin {_finite(phases[0], '.0f', 'deg')} before, {phases[1]:.0f} deg after")
+        return tuple(found)
+
+
+def _finite(value: float, form: str, unit: str) -> str:
+    return f"{value:{form}} {unit}" if np.isfinite(value) else "unlimited"
 
 
 @dataclass(frozen=True)
@@ -141,10 +180,13 @@ class _Job:
     def __init__(self, plant: Plant, settings: ControllerSettings, progress: Progress) -> None:
         self.plant, self.progress = plant, progress
         self.numbers = tuning_numbers()
-        self.targets = section(self.numbers, "feedback_targets")
         self.rest = find_equilibrium(plant)
-        self.model = make_loop_model(self.controller(settings))
-        self.slowest = _slowest_column(self.model)
+        controller = self.controller(settings)
+        table = linear_table(controller)
+        dense = loop_frequencies(np.linalg.eigvals(table.a).astype(complex), count=1500, near=161)
+        self.model = make_loop_model(controller, dense, table)
+        targets = section(self.numbers, "feedback_targets")
+        self.search = FeedbackSearch(self.model, self.controller, plant.axes.tolist(), targets)
         self.steps: list[TuningStep] = []
 
     def done(self, stages: int) -> None:
@@ -174,107 +216,20 @@ def stays_stable(machine: Machine, settings: ControllerSettings, seconds: float 
     return bool(np.all(fading | still | (late < 1e-6 * moved)))
 
 
-# ------------------------------------------------------------------------------------------------- feedback
-def _with(settings: ControllerSettings, k: int, **numbers: float) -> ControllerSettings:
-    """Settings with numbers of degree of freedom k replaced."""
-    changes: dict[str, Any] = {}
-    for name, value in numbers.items():
-        values = list(getattr(settings, name))
-        values[k] = float(value)
-        changes[name] = tuple(values)
-    return replace(settings, **changes)
-
-
-def _with_displacement_gain(job: _Job, settings: ControllerSettings, k: int, value: float) -> ControllerSettings:
-    """Settings with the displacement gain of degree of freedom k and the corresponding reset gain."""
-    reset = job.targets.reset_ratio * value**2
-    return _with(settings, k, displacement_gain=value, reset_gain=reset)
-
-
 def _tune_feedback(job: _Job, settings: ControllerSettings) -> ControllerSettings:
-    """Kx, KF, and both again, of all axes: from low gains up, each in turn as far as the margins allow."""
-    targets = job.targets
-    most = targets.displacement_bandwidth * 2.0 * np.pi * job.slowest
-    first = most * targets.first_gain
-    axes = job.plant.axes
-    tuned = settings
-    for k in map(int, axes):
-        tuned = _with(_with_displacement_gain(job, tuned, k, first), k, force_damping=0.0)
-    if not stays_stable(job.plant.machine, tuned):
+    """Kx and KF of all axes, from low gains up (`feedback_search`)."""
+    search = job.search
+    lowest = search.lowest(settings)
+    if not stays_stable(job.plant.machine, lowest):
         raise SimulationError(
             "unstable even with the lowest gains tried: check master gains, delays, valves and notches"
         )
-    reached = None
-    while tuned != reached:  # damping of the oil columns admits higher displacement gains, and so on
-        reached = tuned
-        for a in range(axes.size):
-            tuned = _raise_displacement_gain(job, tuned, a, first, most)
-        for a in range(axes.size):
-            tuned = _raise_damping(job, tuned, a)
-    for m, k in zip(margins(job.model, job.controller(tuned)), axes, strict=True):
-        why = f"gain margin {20 * np.log10(m.gain):.1f} dB at {m.gain_frequency:.3g} Hz"
-        for stage, name in (("Kx", "displacement_gain"), ("KF", "force_damping")):
+    tuned = search.raised(lowest)
+    for a, k in enumerate(search.axes):
+        stages = (("Kx", "displacement_gain"), ("KF", "force_damping"))
+        for (stage, name), why in zip(stages, search.limits(tuned, a), strict=True):
             job.steps.append(TuningStep(stage, AXES[k], getattr(settings, name)[k], getattr(tuned, name)[k], why))
     return tuned
-
-
-def _raise_displacement_gain(
-    job: _Job, settings: ControllerSettings, a: int, first: float, most: float
-) -> ControllerSettings:
-    """Settings with the highest displacement gain of free axis a that is allowed, up to `most`."""
-    k = int(job.plant.axes[a])
-    best, value = settings, max(first, settings.displacement_gain[k])
-    while value <= most:
-        trial = _with_displacement_gain(job, settings, k, value)
-        if not _allowed(job, trial, a):
-            break
-        best, value = trial, value * job.targets.growth
-    return best
-
-
-def _raise_damping(job: _Job, settings: ControllerSettings, a: int) -> ControllerSettings:
-    """Settings with more force feedback on free axis a, as allowed, until its resonance is damped enough."""
-    targets, k = job.targets, int(job.plant.axes[a])
-    best, value = settings, max(targets.first_damping, settings.force_damping[k])
-    peak = _resonance(job, settings, a)
-    while value <= 1.0 and peak > targets.resonance:
-        trial = _with(settings, k, force_damping=value)
-        if not _allowed(job, trial, a) or (lowered := _resonance(job, trial, a)) > peak:
-            break
-        best, peak, value = trial, lowered, value * targets.growth
-    return best
-
-
-def _allowed(job: _Job, settings: ControllerSettings, a: int) -> bool:
-    """Whether axis a keeps its gain margin, sensitivity and phase margin, and the other axes nearly.
-
-    The phase margin counts below the oil columns; above them the sensitivity measures the distance of the loop from -1.
-    """
-    targets, controller = job.targets, job.controller(settings)
-    inner = np.linalg.inv(np.eye(len(controller.axis)) + loop_gain(job.model, controller))
-    sensitivity = np.abs(np.einsum("mkk->mk", inner)).max(axis=0)
-    for k, m in enumerate(margins(job.model, controller, job.slowest)):
-        slack = 1.0 if k == a else targets.neighbours
-        if m.phase * slack < targets.phase_margin or m.gain * slack < targets.gain_margin:
-            return False
-        if sensitivity[k] > slack * targets.sensitivity:
-            return False
-    return True
-
-
-def _slowest_column(model: LoopModel) -> float:
-    """Frequency [Hz] of the slowest oil column: the first peak of the plant's own velocity response."""
-    speed = np.abs(np.einsum("mkk->mk", model.displacement)) * model.frequency[:, None]
-    inside = model.frequency > 2.0
-    return float(min(model.frequency[inside][np.argmax(column[inside])] for column in speed.T))
-
-
-def _resonance(job: _Job, settings: ControllerSettings, a: int) -> float:
-    """Largest velocity response of an axis to its velocity command, its loops closed [1]."""
-    model, controller = job.model, job.controller(settings)
-    inner = np.linalg.inv(np.eye(len(controller.axis)) + loop_gain(model, controller))
-    speed = 2.0 * np.pi * model.frequency * np.abs((model.displacement @ inner)[:, a, a])
-    return float(speed[model.frequency > 2.0].max())
 
 
 # --------------------------------------------------------------------------------------------- feed-forward
@@ -285,8 +240,8 @@ def _tune_feedforward(job: _Job, settings: ControllerSettings) -> tuple[Controll
     segment = job.numbers.number("noise.segment")
     tuned = settings
     for k in job.plant.axes:  # a well-conditioned start, independent of the settings given
-        tuned = _with(tuned, int(k), **dict(zip(FEEDFORWARD, (1.0, 0.0, 0.0), strict=True)))
-    bands = (goals.low, job.slowest * goals.integrator_band), (goals.low, goals.high)
+        tuned = with_gains(tuned, int(k), **dict(zip(FEEDFORWARD, (1.0, 0.0, 0.0), strict=True)))
+    bands = (goals.low, job.search.slowest * goals.integrator_band), (goals.low, goals.high)
     stages: list[tuple[str, tuple[int, ...]]] = [("Kvf", ()), ("Kjf", (2,)), *[("Kaf", (1, 2))] * int(goals.rounds)]
     delay = 0.0
     for n, (stage, terms) in enumerate(stages):
@@ -302,7 +257,7 @@ def _tune_feedforward(job: _Job, settings: ControllerSettings) -> tuple[Controll
                 if n == len(stages) - 1 or symbol == stage != "Kaf":
                     old, why = getattr(tuned, name)[k], f"expected error {error:.3f}"
                     job.steps.append(TuningStep(symbol, AXES[k], old, gains[term], why))
-                tuned = _with(tuned, k, **{name: gains[term]})
+                tuned = with_gains(tuned, k, **{name: gains[term]})
         job.done(3 + n)
     job.steps.append(TuningStep("delay", "all", 0.0, delay, "common to all axes, least total error"))
     return tuned, delay

@@ -19,13 +19,18 @@ class Asked:
     needed: bool = False
     sizes: tuple[int, ...] = (1,)  # how many numbers it may have
     when: str = ""  # "free": only of a six-leg platform
+    example: str = ""  # of an answer, where it has several numbers
 
 
 ASKED: Mapping[str, Asked] = {
     "mass": Asked("kg", "Moving mass: table, fittings, pistons; one number, or one an axis", True, (1, 2, 3)),
-    "size": Asked("m", "Table in plan, along x and y", sizes=(2,)),
+    "size": Asked("m", "Table in plan, along x and y, as in '2 3 m'", sizes=(2,), example="2 3 m"),
     "inertia": Asked(
-        "kg m2", "Moments of inertia about x, y, z through the centre of gravity", sizes=(3,), when="free"
+        "kg m2",
+        "Moments of inertia about x, y, z through the centre of gravity, as in '80 90 150 kg m2'",
+        sizes=(3,),
+        when="free",
+        example="80 90 150 kg m2",
     ),
     "area": Asked("m2", "Piston area that the oil acts on (of a single-rod cylinder that without the rod)"),
     "bore": Asked("m", "Bore of the cylinder, in place of the area"),
@@ -34,7 +39,9 @@ ASKED: Mapping[str, Asked] = {
     "length": Asked("m", "Actuator from swivel to swivel at mid-stroke"),
     "supply_pressure": Asked("Pa", "Supply pressure", True),
     "return_pressure": Asked("Pa", "Return pressure"),
-    "speed": Asked("m/s", "Speed of the piston without load at full command (or per volt, with the full voltage)"),
+    "speed": Asked(
+        "m/s", "Speed of the piston without load at full command, or per volt (--voltage): its slope at null"
+    ),
     "rated_flow": Asked("m3/s", "Rated flow of the valve, all valves of an actuator together; in place of the speed"),
     "rated_drop": Asked("Pa", "Pressure drop over both paths of the valve at which that flow is rated"),
     "valve_delay": Asked("s", "Delay of the valve, from command to spool"),
@@ -52,8 +59,9 @@ ASKED: Mapping[str, Asked] = {
 def read_answers(texts: Mapping[str, str], voltage: float | None = None) -> dict[str, Quantity]:
     """Quantities of what was answered, by name, in SI; `voltage` [V] is the full command, for a speed per volt.
 
-    Such a speed becomes `slope`: at full command, if the valve's flow were proportional to it. That voltage itself is
-    among the quantities, too.
+    Such a speed becomes `slope`: at full command, if the valve's flow were proportional to it as at null. A measured
+    speed per volt is one of small commands; a speed at full command has no volt. The voltage itself is among the
+    quantities, too.
     Raises ParameterError naming the option for what cannot be read, is not positive, or is missing.
     """
     found = {}
@@ -66,11 +74,14 @@ def read_answers(texts: Mapping[str, str], voltage: float | None = None) -> dict
             name = "slope"
             found[name] = _per_volt(text, voltage, option, source)
         else:
-            found[name] = read_stated(text, asked.unit, option, source)
+            found[name] = read_stated(text, asked.unit, option, source, asked.example)
         value = found[name].value
         numbers = value if isinstance(value, tuple) else (value,)
         if len(numbers) not in asked.sizes:
-            raise ParameterError(f"{option}: {text!r} should be {' or '.join(map(str, asked.sizes))} number(s)")
+            example = f", as in '{asked.example}'" if asked.example else ""
+            raise ParameterError(
+                f"{option}: {text!r} should be {' or '.join(map(str, asked.sizes))} number(s){example}"
+            )
         if min(numbers) < 0.0 or (min(numbers) == 0.0 and name not in ("return_pressure", "valve_delay", "friction")):
             raise ParameterError(f"{option}: {text!r} must be positive")
     if voltage is not None:
@@ -95,4 +106,4 @@ def _per_volt(text: str, voltage: float | None, option: str, source: str) -> Qua
     if isinstance(slope.value, tuple) or isinstance(slope.sd, tuple):
         raise ParameterError(f"{option}: {text!r} should be 1 number")
     sd = None if slope.sd is None else slope.sd * voltage
-    return Quantity(slope.value * voltage, "m/s", "measured", f"{source}, times {voltage:g} V", sd)
+    return Quantity(slope.value * voltage, "m/s", "measured", f"{source}, slope at null, times {voltage:g} V", sd)

@@ -51,6 +51,10 @@ def draft_machine(
     valve, speed = _valve(basis, (area_a, area_b), (high, low))
     legs = _legs(basis, motion, vector(platen["size"]), -vector(platen["bearing_plane"])[2])
     limits = _limits(basis, legs, motion, platen, speed, (area_a * (high - low), area_b * (high - low)))
+    if "slope" in known:
+        slope, fast = basis.number("slope"), limits["velocity"]
+        why = f"{fast.source}; by the assumed flow curve {speed / slope:.3g} of the {slope:.4g} m/s of a straight one"
+        limits["velocity"] = replace(fast, source=why)
     sections = {"platen": platen, "hydraulics": oil, KIND: {**drive, **valve}, **_ends(basis, legs), "limits": limits}
     numbers = {
         f"{section}.{key}": replace(q, value=_rounded(q.value), sd=None if q.sd is None else _rounded(q.sd))

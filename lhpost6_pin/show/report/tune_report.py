@@ -10,7 +10,7 @@ from .page import Block, Headline, Level, Page, Section, Table, bullet_list, gri
 from .scales import decibels, degrees, milliseconds
 from .tune_plots import bode_figure, overview_figure
 
-__all__ = ["measuring_doubts", "tuning_tables", "write_tune_report"]
+__all__ = ["losses", "measuring_doubts", "tuning_tables", "write_tune_report"]
 
 # Judgement, not physics: the band in which every axis must follow its reference, and the margin it must keep.
 FOLLOWED = (0.1, 20.0)  # [Hz]
@@ -68,12 +68,18 @@ def _verdict(tuning: Tuning) -> tuple[str, Level]:
         if low
         else f"The gain margin of every axis is at least {GAIN_MARGIN:g} dB.",
         f"The loop is {'stable' if tuning.doubled else 'unstable'} with all master gains doubled.",
+        *losses(tuning),
         *measuring_doubts(tuning),
     ]
     if any(np.isnan(axis.band_after[0]) for axis in tuning.axes):
         return " ".join(words), "bad"
-    doubtful = short or low or not tuning.doubled or measuring_doubts(tuning)
+    doubtful = short or low or not tuning.doubled or losses(tuning) or measuring_doubts(tuning)
     return " ".join(words), "attention" if doubtful else "good"
+
+
+def losses(tuning: Tuning) -> list[str]:
+    """Sentences on axes that are worse with the settings found than with those before."""
+    return [f"Worse than before in {axis.axis}: {'; '.join(axis.worse)}." for axis in tuning.axes if axis.worse]
 
 
 def measuring_doubts(tuning: Tuning) -> list[str]:
@@ -189,7 +195,8 @@ def _steps(tuning: Tuning) -> list[Block]:
         for n, step in enumerate(tuning.steps, 1)
     ]
     how = (
-        "Feedback first, displacement gain Kx and force feedback KF, on the linear model; then feedforward of "
+        "Feedback first, displacement gain Kx and force feedback KF, on the linear model, each with the criterion that "
+        "ends its search; then feedforward of "
         "velocity Kvf, jerk Kjf and acceleration Kaf, fitted to the response measured. The expected error of a fit is "
         "the relative deviation of the response from a pure delay over the fitted band."
     )

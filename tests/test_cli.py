@@ -428,6 +428,12 @@ def test_options_that_cannot_be_are_refused_before_anything_is_shown(lhpost6, tm
         assert refused(lhpost6(*command, *options), message)
 
 
+def test_a_drive_whose_target_is_beyond_the_limits_of_the_table_is_not_replayed(lhpost6, tmp_path):
+    target = make_target(find_motion("sine", cycles=1, ramp_cycles=1), scale=50.0)
+    save_drive(target.acceleration, "acceleration", target, tmp_path / "drive.nc", circumstances(load_machine(), "any"))
+    assert refused(lhpost6("replay", "drive.nc"), "exceeds the capacity of the table", "largest scale that fits")
+
+
 def test_a_command_that_is_refused_before_anything_is_done_leaves_no_bar(lhpost6, tmp_path):
     for command in (("campaign", "--tests", "TQ"), ("iterate", "sine", "--gain", "0"), ("serve", "--mode", "loose")):
         ended = lhpost6(*command)

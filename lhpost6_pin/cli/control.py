@@ -111,7 +111,7 @@ def replay(
     settings = opt.find_settings(controller, table)
     options = steps.checked(table)
     found = scaled_drive(load_drive(drive), scale)
-    if scale != 1.0 and not beyond:
+    if not beyond:
         check_motion_limits(make_plant(table), found.target)
     check_circumstances(str(drive), found.attrs, table, settings.name)
     if found.mode != settings.mode:

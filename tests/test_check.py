@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from lhpost6_pin.data import campaign_check
 from lhpost6_pin.data.check import check_dataset, check_record
 from lhpost6_pin.data.layout_faults import RecordFinding
 from lhpost6_pin.data.records import load_record, make_record
@@ -304,3 +305,16 @@ def test_what_cannot_be_opened_is_one_error_that_names_the_file(tmp_path: Path):
     for name in ("notes.nc", "absent.nc"):
         (finding,) = check_record(tmp_path / name)
         assert finding.severity == "error" and name in finding.message
+
+
+def test_lengths_of_turned_sign_or_in_a_wrong_unit_contradict_the_pose(tests):
+    right = campaign_check.check_campaign(MACHINE, [tests["EQ"]], "lhpost6")
+    assert right is not None and right.contradictions == ()
+    length, place = "actuator_displacement", {"actuator": "H2"}
+    for factor, remedy in ((-1.0, "turned; correct its sign"), (25.4, "correct its unit or factor")):
+        wrong = tests["EQ"].copy(deep=True)
+        wrong[length].loc[place] *= factor
+        found = campaign_check.check_campaign(MACHINE, [wrong], "lhpost6")
+        assert found is not None
+        (words,) = (words for words in found.contradictions if words.startswith(f"{length}[H2]: "))
+        assert remedy in words and f"gain {factor:.2g}" in words

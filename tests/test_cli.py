@@ -168,7 +168,7 @@ def test_check_names_channel_and_sample_of_a_broken_record_and_exits_1(lhpost6, 
     record.to_netcdf(tmp_path / "broken.nc", engine="h5netcdf")
     ended = lhpost6("check", "broken.nc")
     assert ended.code == 1
-    assert "actuator_force[H3]" in ended.words and "1234" in ended.words and "1 errors" in ended.words
+    assert "actuator_force[H3]" in ended.words and "1234" in ended.words and "1 error, " in ended.words
 
 
 def test_check_holds_the_sensors_of_a_measured_record_against_each_other(lhpost6, tmp_path):
@@ -531,6 +531,10 @@ def test_a_view_mounts_what_the_record_states_and_warns_where_it_cannot(lhpost6,
         sizes[name] = (tmp_path / f"{name}.html").stat().st_size
     assert sizes["stated"] > sizes["old"]  # the pendulum's shapes
     assert abs(sizes["moved"] - sizes["old"]) < 1000
+
+
+def test_decompose_on_another_machine_is_refused(lhpost6):
+    assert refused(lhpost6("decompose", PRACTICE, "--machine", "uniaxial"), "has labels H1", "--machine")
 
 
 def test_open_loop_replays_a_record_of_another_machine_on_that_machine_only(lhpost6, tmp_path, brief):

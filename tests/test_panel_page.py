@@ -344,6 +344,7 @@ def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
         await wait(tab, reads("machine", "LHPOST6"))
         await wait(tab, reads("link", "not connected yet"))
         assert await tab.evaluate("document.getElementById('platen-state').textContent") == "unknown"
+        await wait(tab, "!document.getElementById('trip').disabled", "anybody may trip the table")
         await enter(tab, "name", "Anna")
         await press(tab, "take")
         for name in ("pressure-low", "pressure-high"):

@@ -75,7 +75,7 @@ def test_cancellers_sit_on_the_multiples_of_their_axis(controller):
     [
         ("uniaxial", "y", 0.01, 1.0, "uniaxial cannot move in y; choose --axis from x"),
         ("lhpost6", "x", 1e-4, 40.0, "a sine of 40 Hz lies outside the table's band"),
-        ("lhpost6", "z", 0.3, 0.5, r"without cancellers stopped at .* V. left its stroke"),
+        ("lhpost6", "z", 0.3, 0.5, r"without cancellers the run stopped at .* V. left its stroke"),
     ],
 )
 def test_a_sine_that_cannot_be_is_refused(machine, axis, amplitude, frequency, message):
@@ -86,8 +86,18 @@ def test_a_sine_that_cannot_be_is_refused(machine, axis, amplitude, frequency, m
 
 def test_a_sine_that_lifts_the_platen_off_an_actuator_is_refused():
     machine = load_machine().with_specimen("block_4_9MN", (4.0, 1.5, 0.0))
-    with pytest.raises(SimulationError, match=r"without cancellers became unphysical at .* chamber A of V"):
+    with pytest.raises(SimulationError, match=r"without cancellers the run became unphysical at .* chamber A of V"):
         sine_test(machine, load_controller("cautious"), axis="z", amplitude=0.08, frequency=2.0)
+
+
+def test_cancellers_that_are_unstable_are_named_where_the_controller_alone_runs_the_sine(monkeypatch):
+    runs = iter(["", "became unphysical at 3 s"])
+    monkeypatch.setattr(module, "with_pressure_trouble", lambda run: replace(run, trouble=next(runs)))
+    message = (
+        "with cancellers the run became unphysical at 3 s. Without them the same sine runs to its end: the cancellers"
+    )
+    with pytest.raises(SimulationError, match=message):
+        sine_test(load_machine("uniaxial"), load_controller("uniaxial"), axis="x", amplitude=0.01, frequency=1.0)
 
 
 def test_frequencies_without_end_and_other_modes_are_refused():

@@ -32,6 +32,12 @@ def test_a_spelling_has_its_factor_and_quantity(text, factor, si):
     assert quantity_unit(text) == si
 
 
+def test_units_of_us_data_sheets_are_known():
+    gallon, pound = 231 * 0.0254**3, 0.45359237  # by definition
+    assert parse_unit("gpm").factor == pytest.approx(gallon / 60.0, rel=1e-12)
+    assert parse_unit("lbm").factor == pytest.approx(pound, rel=1e-12)
+
+
 @pytest.mark.parametrize("text", ["dB", "degC", "furlongs per fortnight", "", "m^9", "__import__('os')"])
 def test_what_is_no_unit_with_a_factor_is_none(text):
     assert parse_unit(text) is None and quantity_unit(text) is None

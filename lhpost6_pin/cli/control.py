@@ -83,7 +83,7 @@ def iterate(
     save_inverse(replace(result.table.inverse, made_with=facts), files[1])
     write_iterate_report(result, files[2], command=repeating_command(), loop=loop)
     entries = {key: loop.get(key) for key in LOOP_FACTS}
-    print_result(json, lambda: iteration_entries(result) | entries, lambda: print_iterations(result), files)
+    print_result(json, lambda: iteration_entries(result) | entries, lambda: print_iterations(result, loop), files)
 
 
 @command()
@@ -179,4 +179,4 @@ def sine(
         found = sine_test(table, settings, axis=axis, amplitude=amplitude, frequency=frequency, progress=progress)
     report = write_sine_report(found, folder / "report.html", command=repeating_command(), loop=loop)
     entries = {key: loop.get(key) for key in LOOP_FACTS}
-    print_result(json, lambda: sine_entries(found) | entries, lambda: print_sine(found), [report])
+    print_result(json, lambda: sine_entries(found) | entries, lambda: print_sine(found, loop), [report])

@@ -147,8 +147,9 @@ def decompose(
     from ..show.result_tables import print_agreement
     from ..show.results import agreement_entries
 
-    measured = load_record(record)
-    table = machine.onto_for(machine.load_bare(), [measured])
+    bare = machine.load_bare()
+    measured = load_record(record, bare.labels)
+    table = machine.onto_for(bare, [measured])
     folder = opt.folder_for(out, f"{opt.record_name(record, measured.attrs)}_forces", "ledger.nc", "report.html")
     known = None
     if is_measured(measured) or sensors:

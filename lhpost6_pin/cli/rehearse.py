@@ -149,6 +149,9 @@ def open_loop(
     name = f"{test}_open_loop"
     folder = opt.folder_for(out, name, *RUN_FILES, inputs=[record])
     attrs = {"test": name, "title": f"{test}, open loop", "source": f"spools of {record}"}
+    mounted = table.specimen.name if table.specimen else "none"
+    if (made := str(measured.attrs.get("specimen", mounted))) != mounted:
+        log.warning("%s: was recorded with specimen %s, this run has %s", record, made, mounted)
     with progress_bar(f"{name} on {table.name}") as progress:
         simulated = replay(table, measured, attrs=attrs, progress=progress, **options)
     save_run(simulated, folder, json, against=measured)

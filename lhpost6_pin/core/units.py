@@ -18,6 +18,8 @@ _SPELLINGS = {  # by case-folded word; `g` is standard gravity, never gram
     "fraction": "dimensionless",
     **{word.casefold(): word for word in ("m", "mm", "cm", "rad", "ms", "N", "kN", "Pa", "kPa", "MPa", "psi", "ksi")},
     "gal": "(cm/s**2)",
+    "gpm": "(gallon/minute)",
+    **dict.fromkeys(("lbm", "lbms"), "pound"),
 }
 _AS_WRITTEN = ("mPa", "Ms")
 """Words that differ from a spelling only in case and mean something else."""

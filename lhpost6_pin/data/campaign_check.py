@@ -19,6 +19,9 @@ from .sensors import SensorSet, load_sensors, make_sensors
 
 __all__ = ["CampaignCheck", "check_campaign"]
 
+WRONG = 1.5
+"""Factor of a gain, either way, beyond which a unit or a factor of a channel map is wrong rather than a calibration."""
+
 UNEVEN = 2.0  # a column is that much noisier than those like it: a loose cable rather than a worse sensor
 
 
@@ -35,6 +38,19 @@ class CampaignCheck:
     observable: tuple[Observable, ...]
     content: Parameters | None  # of a sensors file
     reason: str  # why there is none
+
+    @property
+    def contradictions(self) -> tuple[str, ...]:
+        """Redundant sensors of which one is turned, or wrong by a factor: by their gain, with what to correct."""
+        gains = [f for f in self.findings or () if f.quantity.startswith("gain") and f.verdict == "suspicious"]
+        found = []
+        for one in gains:
+            ratio = one.estimate / one.expected
+            if ratio < 0.0:
+                found.append(f"{one.channel}: {one.check}: gain {one.estimate:.4g}: turned; correct its sign")
+            elif max(ratio, 1.0 / max(ratio, 1e-300)) > WRONG:
+                found.append(f"{one.channel}: {one.check}: gain {one.estimate:.4g}: correct its unit or factor")
+        return tuple(found)
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -226,5 +226,5 @@ def refuse_other_machine(machine: "Machine", dataset: xr.Dataset) -> None:
 def _refuse(faults: Sequence[RecordFinding], source: str) -> None:
     """Raise the first few faults as one `RecordError`."""
     if faults:
-        more = f"; and {len(faults) - 3} more faults" * (len(faults) > 3)
+        more = f"; and {len(faults) - 3} more fault{'s' * (len(faults) != 4)}" * (len(faults) > 3)
         raise RecordError(f"{source}: " + "; ".join(map(str, faults[:3])) + more)

@@ -198,12 +198,12 @@ def summary(found: Discovery) -> str:
         text = _unexplained_summary(found, effects)
     else:
         rivals = "; ".join(_rivals_of(one) for one in verdict.effects if one.rivals)
+        changed = f"{len(verdict.changed)} parameter{' differs' if len(verdict.changed) == 1 else 's differ'}"
         text = {
             "none": "no missing effect; no parameter differs from the machine file.",
             "not_testable": f"no missing effect, but {len(verdict.untestable)} families are not testable with this "
             "campaign: it needs more excitation, or sensors that observe them (lhpost6 check).",
-            "parameters_only": f"no missing effect; {len(verdict.changed)} parameters differ: "
-            f"{', '.join(verdict.changed)}.",
+            "parameters_only": f"no missing effect; {changed}: {', '.join(verdict.changed)}.",
             "sensor": f"no missing effect; {_beyond(verdict.sensors)}.",
             "named": f"{effects}.",
             "ambiguous": f"{effects}. {rivals}",

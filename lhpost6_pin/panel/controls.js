@@ -86,7 +86,7 @@ function reasons() { // by id: why not, or ""
     "pressure-high": mine || (pressure === "high" ? "pressure is high" : pressure === "off" ? "low pressure first" : tripped),
     raise: mine || tripped || (pressure !== "high" ? "high pressure first" : platen === "raised" ? "already raised" : platen === "moving" ? "the platen is moving" : waiting),
     park: mine || tripped || (platen === "parked" ? "already parked" : platen === "moving" ? "the platen is moving" : busy ? "stop the program first" : waiting),
-    trip: mine || (trip ? "already tripped" : ""),
+    trip: trip ? "already tripped" : "", // anybody may
     reset: mine || (trip ? "" : "not tripped"),
     run: mine || raised || waiting || (program.state === "running" ? "running" : program.state === "stopping" ? "stopping" : busy ? "" : amiss()),
     hold: mine || tripped || (program.state === "holding" ? "holding" : program.state === "running" ? "" : "no program is running"),
@@ -169,7 +169,7 @@ export function buildPrograms(found) {
   chosen();
 }
 function escape(e) { // the emergency stop by key
-  if (e.key !== "Escape" || e.repeat || state?.you.role !== "operator" || state.trip) return;
+  if (e.key !== "Escape" || e.repeat || !state || state.trip) return;
   e.preventDefault();
   loading = null;
   send({ do: "trip" });

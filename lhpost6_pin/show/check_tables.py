@@ -26,6 +26,7 @@ def check_entries(found: CampaignCheck | None) -> dict[str, Any]:
         "sensors": found.findings,
         "noise": {"rest_seconds": found.rest, "source": found.source, "rate_hz": found.rate, "channels": noise},
         "noise_warnings": found.warnings,
+        "contradictions": found.contradictions,
         "observable": found.observable,
     }
 
@@ -47,6 +48,7 @@ def print_check(found: CampaignCheck) -> None:
     print_blocks(Table(title, header, rows) if rows else "no channel shows noise", *found.warnings)
     if found.findings is not None:
         print_sensor_findings(found.findings)
+        print_blocks(*(f"warning: {words} in the channel map, and import again" for words in found.contradictions))
     told = [(one.quantity, VERDICTS[one.verdict], one.why) for one in found.observable]
     print_blocks(Table("What these sensors can tell", ("quantity", "", "why"), told))
 

@@ -1,5 +1,8 @@
 """Results of commands in a terminal: the tables of their reports."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from ..data.campaign import skipped_summary
 from ..discovery import Discovery
 from ..identification.calibration import Calibration
@@ -25,9 +28,9 @@ from .report.decompose_report import match_tables, residual_tables
 from .report.discover_report import discovery_tables, verdict_sentence
 from .report.friction_section import friction_table
 from .report.interface_section import interface_table
-from .report.iterate_report import iteration_tables, target_demands
+from .report.iterate_report import iterate_verdict, iteration_tables, target_demands
 from .report.page import Table
-from .report.sine_report import sine_table
+from .report.sine_report import sine_table, sine_verdict
 from .report.tune_report import losses, measuring_doubts, tuning_tables
 from .report.validate_machine import drift_blocks
 from .report.validate_report import validation_notes, validation_verdict
@@ -55,16 +58,17 @@ def print_tuning(tuning: Tuning) -> None:
     print_blocks(*before, *tuning_tables(tuning), changed, *limits, doubled, *losses(tuning), *measuring_doubts(tuning))
 
 
-def print_iterations(result: Iterated) -> None:
-    """Print the errors of every iteration, and the stopping criterion."""
-    print_blocks(*iteration_tables(result), target_demands(result), f"stopped: {result.reason}")
+def print_iterations(result: Iterated, loop: Mapping[str, Any]) -> None:
+    """Print the verdict, the errors of every iteration, and the stopping criterion."""
+    verdict, _ = iterate_verdict(result, loop)
+    print_blocks(verdict, *iteration_tables(result), target_demands(result), f"stopped: {result.reason}")
 
 
-def print_sine(test: SineTest) -> None:
-    """Print amplitude, phase and distortion without and with cancellers."""
+def print_sine(test: SineTest, loop: Mapping[str, Any]) -> None:
+    """Print the verdict, amplitude, phase and distortion without and with cancellers."""
     amplitude = f"{test.amplitude:g} {'m' if test.axis in 'xyz' else 'rad'}"
     what = f"{amplitude} at {test.frequency:g} Hz in {test.axis}; distortion over all harmonics to 33 Hz"
-    print_blocks(what, sine_table(test))
+    print_blocks(sine_verdict(test, loop)[0], what, sine_table(test))
 
 
 def print_calibration(calibration: Calibration) -> None:

@@ -148,7 +148,7 @@ def print_findings(file: str, findings: "Sequence[RecordFinding]") -> None:
     counts = {s: sum(f.severity == s for f in findings) for s in ("error", "warning")}
     print_blocks(
         Table(file, ("", "channel", "sample", "finding", "remedy"), rows),
-        f"{counts['error']} errors, {counts['warning']} warnings",
+        ", ".join(f"{counts[kind]} {kind}{'s' * (counts[kind] != 1)}" for kind in ("error", "warning")),
     )
 
 

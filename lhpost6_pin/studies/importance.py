@@ -40,16 +40,17 @@ def importances(names: list[str], coordinates: Array, result: Array, numbers: Pa
     """Indices of all numbers for a result (n,) of machines at `coordinates` (n, k), the largest first.
 
     The level of chance is that of the largest index after permutations of the result, which follows from nothing then.
-    Empty with too few finite results, or a result that does not vary. Raises ParameterError if SALib is not installed.
+    Empty with too few finite results, or a result that does not vary. Else raises ParameterError if SALib is not
+    installed.
     """
-    try:
-        from SALib.analyze import rbd_fast
-    except ImportError:
-        raise ParameterError('importance needs SALib: pip install SALib') from None
     some = np.isfinite(result)
     y, x = result[some], coordinates[some]
     if len(y) < FEWEST or np.ptp(y) <= 1e-12 * np.abs(y).max():
         return ()
+    try:
+        from SALib.analyze import rbd_fast
+    except ImportError:
+        raise ParameterError("importance needs SALib: pip install SALib") from None
     harmonics = min(int(numbers.number("importance.harmonics")), len(y) // 4 - 1)
     problem = {"num_vars": len(names), "names": names, "bounds": np.stack([x.min(axis=0), x.max(axis=0)], 1).tolist()}
 

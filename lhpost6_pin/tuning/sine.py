@@ -175,7 +175,8 @@ def sine_test(
             simulate(plant, ClosedLoop(controller, drive, rest), samples=len(wanted), **options)
         )
         if run.trouble:
-            raise SimulationError(f"{'with' if n else 'without'} cancellers {run.trouble}")
+            without = ". Without them the same sine runs to its end: the cancellers are unstable here" if n else ""
+            raise SimulationError(f"{'with' if n else 'without'} cancellers the run {run.trouble}{without}")
         found.append(_evaluate(run, target, AXES.index(axis), frequency, measured, counted))
         if progress is not None:
             progress((n + 1) / 2)

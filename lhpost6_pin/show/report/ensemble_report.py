@@ -54,8 +54,9 @@ def _count(number: int, name: str) -> str:
 
 
 def _headlines(found: EnsembleSummary, scale: int, failed: int) -> list[Headline]:
-    whole: Level = "bad" if failed else "attention" if found.stopped else "good"
-    headlines = [Headline(f"{found.runs - failed - found.stopped}", "whole runs", f"of {found.runs}", whole)]
+    whole: Level = "bad" if failed else "attention" if found.stopped or found.troubles else "good"
+    note = f"of {found.runs}{'; troubles below' * bool(found.troubles)}"
+    headlines = [Headline(f"{found.runs - failed - found.stopped}", "whole runs", note, whole)]
     if found.configurations:
         own = max(found.configurations, key=lambda own: np.nan_to_num(own.exceedances[0].share[scale]))
         one, count = own.exceedances[0], len(found.configurations)
@@ -86,6 +87,8 @@ def _risk_blocks(results: xr.Dataset, found: EnsembleSummary, scale: int) -> lis
     return [
         *figures,
         demand_figure(results, scale),
+        "Demands are of what the table achieved: of a motion beyond it, valves saturate first, and displacement and "
+        "velocity stay below their limits. What a target would demand is checked by `run`. "
         "A command is clipped at full spool, so that the demand on a spool is at most one: between two scales it "
         "counts as saturated from the upper one.",
         risk_table(found),

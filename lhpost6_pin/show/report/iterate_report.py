@@ -19,7 +19,7 @@ from .page import Block, Figure, Headline, Level, Page, Section, Table, details,
 from .run_limits import demand_table
 from .scales import milliseconds, percent
 
-__all__ = ["iteration_tables", "target_demands", "write_iterate_report"]
+__all__ = ["iterate_verdict", "iteration_tables", "target_demands", "write_iterate_report"]
 
 # Judgement, not physics: largest acceleration RRMSE of an axis, and its share of the error before iterating.
 REACHED = 0.05
@@ -35,7 +35,7 @@ def write_iterate_report(
 
     loop: stability of the control loop, see `loop_sentence`.
     """
-    verdict, level = _verdict(result, loop or {})
+    verdict, level = iterate_verdict(result, loop or {})
     reference, machine = result.target.reference, result.first_run.plant.machine
     high = tuning_numbers().number("iteration.high")
     found = compare(result, high)
@@ -76,7 +76,8 @@ def _by_axis(result: Iterated, iteration: Iteration, quantity: str = "accelerati
     return {axis: float(getattr(iteration, quantity)[AXES.index(axis)]) for axis in _moved(result)}
 
 
-def _verdict(result: Iterated, loop: Mapping[str, Any]) -> tuple[str, Level]:
+def iterate_verdict(result: Iterated, loop: Mapping[str, Any]) -> tuple[str, Level]:
+    """Return the verdict, which begins with what its `loop` lacks, and its level."""
     best = result.history[result.best]
     errors, before = _by_axis(result, best), _by_axis(result, result.history[0])
     large = [axis for axis, error in errors.items() if not error <= REACHED]

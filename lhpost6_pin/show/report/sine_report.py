@@ -21,7 +21,7 @@ from .sine_plots import (
     spool_blocks,
 )
 
-__all__ = ["sine_table", "write_sine_report"]
+__all__ = ["sine_table", "sine_verdict", "write_sine_report"]
 
 # Judgement, not physics: what a sine test must reach.
 AMPLITUDE = 0.01
@@ -43,7 +43,7 @@ def write_sine_report(
     amplitude = shown_as(test.amplitude, axis_scale(test.axis, "displacement"))
     time = test.target.time[test.measured]
     cycles = round((time[-1] - time[0]) * test.frequency)
-    verdict, level = _verdict(test, loop or {})
+    verdict, level = sine_verdict(test, loop or {})
     numbers = assumption_blocks(machine, ("sine", "feedforward_targets.high"))
     page = Page(
         kind="Sine report · simulated",
@@ -76,7 +76,8 @@ def _reached(test: SineTest) -> tuple[bool, bool, bool]:
     return abs(after.amplitude_error) <= AMPLITUDE, bool(abs(after.phase_error) <= PHASE), halved
 
 
-def _verdict(test: SineTest, loop: Mapping[str, Any]) -> tuple[str, Level]:
+def sine_verdict(test: SineTest, loop: Mapping[str, Any]) -> tuple[str, Level]:
+    """Return the verdict, which begins with what its `loop` lacks, and its level."""
     after, before = test.after, test.before
     amplitude, phase, halved = _reached(test)
     unsteady, unstable = loop_sentence(loop)

@@ -83,7 +83,8 @@ def _write_draft_map(
         raise RecordError(f"{path}: exists and may have been edited; remove it, or name another with --out")
     save_map(found, path, remarks)
     then = f"{again} --map {shlex.quote(str(path))}"
-    hint = f"{path}: {len(found.channels)} channels, {len(remarks)} remark{'s' * (len(remarks) != 1)}; read and edit it, then\n{then}"
+    left = f"{len(remarks)} remark{'s' * (len(remarks) != 1)}"
+    hint = f"{path}: {len(found.channels)} channels, {left}; read and edit it, then\n{then}"
     entries = {"channels": len(found.channels), "remarks": remarks, "then": then}
     print_result(json, lambda: entries, lambda: typer.echo(hint), [path])
 

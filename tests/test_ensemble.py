@@ -457,7 +457,9 @@ def test_the_card_of_the_risk_is_of_the_worst_configuration():
         )
 
     three = [configuration(name, share) for name, share in (("mild", 0.1), ("hard", 0.4), ("fair", 0.2))]
-    found = SimpleNamespace(runs=9, stopped=0, level=0.05, scales=[0.5, 1.0], configurations=three, shown_spreads=[])
+    found = SimpleNamespace(
+        runs=9, stopped=0, troubles={}, level=0.05, scales=[0.5, 1.0], configurations=three, shown_spreads=[]
+    )
     _, card = _headlines(found, 1, 0)
     assert card.value.startswith("40") and "hard, specimen none" in card.note and card.level == "attention"
     assert card.note.endswith("the worst of 3 configurations")

@@ -129,7 +129,7 @@ def test_models_that_cannot_stand_are_refused(build, message):
 
 def test_without_opensees_the_packages_are_named(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "openseespy.opensees", None)
-    with pytest.raises(SimulationError, match=r"lhpost6-pin\[opensees\].*apt-get install libblas3 liblapack3"):
+    with pytest.raises(SimulationError, match=r"pip install openseespy.*apt-get install libblas3 liblapack3"):
         import_opensees()
 
 

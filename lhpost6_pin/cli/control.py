@@ -111,9 +111,9 @@ def replay(
     settings = opt.find_settings(controller, table)
     options = steps.checked(table)
     found = scaled_drive(load_drive(drive), scale)
+    check_circumstances(str(drive), found.attrs, table, settings.name)
     if not beyond:
         check_motion_limits(make_plant(table), found.target)
-    check_circumstances(str(drive), found.attrs, table, settings.name)
     if found.mode != settings.mode:
         raise SimulationError(
             f"{drive} is for reference generators in {found.mode} mode; {settings.name} has {settings.mode} mode"

@@ -141,7 +141,7 @@ def residual_tables(found: Decomposed, agreement: WrenchAgreement) -> list[Table
             varying,
         ),
         Table(
-            f"Mean of the residual; one standard deviation of each (sufficient: within {within})",
+            f"Mean of the residual: one standard deviation of each (sufficient: within {within})",
             ("Axis", "Residual", *tail),
             means,
         ),

@@ -521,6 +521,7 @@ def test_groups_of_residuals_agree_as_chance_allows_where_nothing_is_wrong(machi
     assert all(abs(one.deviations) < 5.0 for one in apart)
 
 
+@pytest.mark.slow
 def test_a_group_that_contradicts_the_others_is_found(machine, sensors, campaign, found):
     """Horizontal load cells 4 % high, thirteen stated deviations: the wrench gives another mass than its prior."""
     high = np.where([name.startswith("H") for name in machine.actuator_names], 1.04, 1.0)

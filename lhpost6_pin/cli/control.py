@@ -11,7 +11,7 @@ from ..core.names import AXES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import completing
-from .loop_check import LOOP_FACTS, checked_loop, interaction_of, loop_facts
+from .loop_check import checked_loop, interaction_of, loop_entries, loop_facts
 from .motion_options import MotionOptions
 from .rehearse import save_run
 from .results_folder import RUN_FILES
@@ -82,8 +82,9 @@ def iterate(
     save_drive(result.drive, settings.mode, target, files[0], {**facts, "iteration": result.best})
     save_inverse(replace(result.table.inverse, made_with=facts), files[1])
     write_iterate_report(result, files[2], command=repeating_command(), loop=loop)
-    entries = {key: loop.get(key) for key in LOOP_FACTS}
-    print_result(json, lambda: iteration_entries(result) | entries, lambda: print_iterations(result, loop), files)
+    print_result(
+        json, lambda: iteration_entries(result) | loop_entries(loop), lambda: print_iterations(result, loop), files
+    )
 
 
 @command()
@@ -178,5 +179,4 @@ def sine(
     with progress_bar(f"sine in {axis} on {table.name}") as progress:
         found = sine_test(table, settings, axis=axis, amplitude=amplitude, frequency=frequency, progress=progress)
     report = write_sine_report(found, folder / "report.html", command=repeating_command(), loop=loop)
-    entries = {key: loop.get(key) for key in LOOP_FACTS}
-    print_result(json, lambda: sine_entries(found) | entries, lambda: print_sine(found, loop), [report])
+    print_result(json, lambda: sine_entries(found) | loop_entries(loop), lambda: print_sine(found, loop), [report])

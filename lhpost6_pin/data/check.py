@@ -23,7 +23,9 @@ from .channels import LAYOUT, MOTION, channel_name, channel_unit, columns_of
 from .conditioning import resolution
 from .force_units import wrong_force_units
 from .layout_faults import RecordFinding, layout_faults
+from .mass_regression import mass_fits
 from .records import open_record, sample_interval
+from .rests import rest_numbers
 from .signals import differentiate, lowpass_zero_phase
 from .turned_signs import turned_signs
 
@@ -90,7 +92,8 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
     )
     units: list[RecordFinding] = []
     if machine is not None and not errors:
-        errors, units = turned_signs(sound, machine), wrong_force_units(sound, machine)
+        fits = mass_fits(sound, machine, rest_numbers())
+        errors, units = turned_signs(sound, machine, fits), wrong_force_units(sound, machine, fits)
     return errors + [RecordFinding("warning", *warning) for warning in warnings] + units + contents
 
 

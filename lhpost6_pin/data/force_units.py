@@ -22,7 +22,7 @@ from ..mechanics.plant import make_plant
 from ..mechanics.pose import kinematic_jacobian
 from .channels import columns_of
 from .layout_faults import RecordFinding
-from .mass_regression import mass_fits
+from .mass_regression import MassFit, mass_fits
 from .rests import rest_numbers
 
 __all__ = ["wrong_force_units"]
@@ -40,11 +40,14 @@ class _Ratio(NamedTuple):
     by: str  # what requires it
 
 
-def wrong_force_units(record: xr.Dataset, machine: Machine) -> list[RecordFinding]:
+def wrong_force_units(
+    record: xr.Dataset, machine: Machine, fits: Sequence[MassFit] | None = None
+) -> list[RecordFinding]:
     """A warning for measured forces of a record of `machine` that are a factor from what it requires.
 
     The factor is `force_unit.factor` of `models/procedures/rests.toml`, either way. With a specimen that the record
-    states and the machine has not, forces may be larger than the machine requires.
+    states and the machine has not, forces may be larger than the machine requires. `fits` are the record's `mass_fits`,
+    if they are known.
     """
     if "actuator_force" not in record:
         return []
@@ -52,20 +55,17 @@ def wrong_force_units(record: xr.Dataset, machine: Machine) -> list[RecordFindin
     limit = numbers.number("force_unit.factor")
     loaded = machine.specimen is None and str(record.attrs.get("specimen", "none")) != "none"
     wrong: dict[str, list[_Ratio]] = {}
-    for one in (*_in_motion(record, machine, numbers), *_at_rest(record, machine)):
+    fits = mass_fits(record, machine, numbers) if fits is None else fits
+    for one in (*_in_motion(fits, numbers), *_at_rest(record, machine)):
         if one.value < 1.0 / limit or (one.value > limit and not loaded):
             wrong.setdefault(_exchanged(one.value, numbers.number("force_unit.near")), []).append(one)
     return [_finding(units, each) for units, each in wrong.items()]
 
 
-def _in_motion(record: xr.Dataset, machine: Machine, numbers: Parameters) -> Iterator[_Ratio]:
-    for fit in mass_fits(record[["actuator_force", *_motion(record)]], machine, numbers):
-        if fit.by_mass >= numbers.number("force_unit.explained"):
+def _in_motion(fits: Sequence[MassFit], numbers: Parameters) -> Iterator[_Ratio]:
+    for fit in fits:
+        if fit.channel.startswith("actuator_force") and fit.by_mass >= numbers.number("force_unit.explained"):
             yield _Ratio((fit.actuator,), abs(fit.share), "inertia")
-
-
-def _motion(record: xr.Dataset) -> list[str]:
-    return [name for name in ("platen_displacement", "platen_acceleration") if name in record]
 
 
 def _at_rest(record: xr.Dataset, machine: Machine) -> Iterator[_Ratio]:

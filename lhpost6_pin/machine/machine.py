@@ -41,9 +41,13 @@ class Machine(Structure):
 
     def __repr__(self) -> str:
         """What the machine is, in a line; its numbers are in `parameters`."""
-        mounted = self.specimen.name if self.specimen else "none"
         parts = f"{len(self.actuators)} actuators, {len(self.struts)} struts, {len(self.parameters)} numbers"
-        return f"Machine({self.name!r}: {parts}, specimen {mounted}; of {self.parameters.origin})"
+        return f"Machine({self.name!r}: {parts}, specimen {self.mounted}; of {self.parameters.origin})"
+
+    @property
+    def mounted(self) -> str:
+        """Name of the specimen, as records have it; "none" without one."""
+        return self.specimen.name if self.specimen else "none"
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:

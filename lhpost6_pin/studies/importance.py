@@ -11,6 +11,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ParameterError
+from ..core.optional import INSTALL
 from ..machine.parameters import Parameters
 
 __all__ = ["Importance", "importances"]
@@ -50,7 +51,7 @@ def importances(names: list[str], coordinates: Array, result: Array, numbers: Pa
     try:
         from SALib.analyze import rbd_fast
     except ImportError:
-        raise ParameterError("importance needs SALib: pip install SALib") from None
+        raise ParameterError(f"importance needs SALib: {INSTALL['SALib']}") from None
     harmonics = min(int(numbers.number("importance.harmonics")), len(y) // 4 - 1)
     problem = {"num_vars": len(names), "names": names, "bounds": np.stack([x.min(axis=0), x.max(axis=0)], 1).tolist()}
 

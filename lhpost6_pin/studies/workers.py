@@ -14,6 +14,7 @@ from typing import Any
 from joblib import Parallel, cpu_count, delayed, parallel_config
 
 from ..core.errors import ParameterError
+from ..core.optional import INSTALL
 
 __all__ = ["LOCAL", "results_of", "workers"]
 
@@ -45,7 +46,7 @@ def _client(jobs: int, address: str) -> Iterator[None]:
     try:
         from dask.distributed import Client, LocalCluster
     except ImportError:
-        raise ParameterError(f'--dask {address}: needs Dask: pip install "dask[distributed]"') from None
+        raise ParameterError(f"--dask {address}: needs Dask: {INSTALL['distributed']}") from None
     if address != LOCAL:
         try:
             client = Client(address, timeout="10s")

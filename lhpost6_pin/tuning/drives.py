@@ -48,7 +48,7 @@ def circumstances(machine: Machine, controller: str) -> dict[str, str]:
     """Conditions in which a drive or an inverse is valid: machine, specimen, open servovalves, name of the settings."""
     return {
         "machine": machine.name,
-        "specimen": machine.specimen.name if machine.specimen else "none",
+        "specimen": machine.mounted,
         "servovalves": str(sum(a.valves for a in machine.actuators)),
         "controller": controller,
     }

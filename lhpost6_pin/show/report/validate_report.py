@@ -14,7 +14,6 @@ from .validate_sections import (
     named,
     summary_blocks,
     test_blocks,
-    why_not,
     worst_in_words,
     worst_of,
 )
@@ -68,14 +67,11 @@ def validation_verdict(found: Validation) -> tuple[str, Level]:
     level: Level = "good"
     for n in _requested(found):
         worst = worst_of(found, n)
-        if worst is None:
-            sentences.append(f"{PHASES[n].capitalize()}: {why_not(found, n)}.")
-            continue
         words = f"{PHASES[n].capitalize()}: {worst_in_words(found, n)}"
-        spread = found.residual_over_noise if n == 1 else None
+        spread = found.residual_over_noise if n == 1 and worst else None
         residual = f"; residual {number(spread[0], 2)} to {number(spread[1], 2)} times the noise" if spread else ""
         sentences.append(f"{words}{residual}.")
-        level = level if worst[1].rrmse_aligned <= FOLLOWED else "attention"
+        level = "attention" if worst and not worst[1].rrmse_aligned <= FOLLOWED else level
     if any("settings may differ" in words for p in found.phases for words in p.notes):
         sentences.append("The controller settings of the tests are unknown.")
     stopped = [p.test for p in found.phases if any("stopped at" in words for words in (*p.notes, p.reason or ""))]

@@ -127,18 +127,18 @@ def _single_cell(phase: Phase, quantity: str) -> Markup:
     worst = max(_judged(phase, (quantity,)), key=lambda a: a.rrmse_aligned, default=None)
     if worst is None:
         return text("")
-    shade = next(k for k, top in enumerate(_SHADES) if not worst.rrmse_aligned > top)
-    return shaded(f"{percent(worst.rrmse_aligned)} {worst.column}, {number(worst.error_to_noise, 2)} × noise", shade)
+    words = f"{percent(worst.rrmse_aligned)} {worst.column}, {number(worst.error_to_noise, 2)} × noise"
+    return shaded(words, _shade(worst))
 
 
 def _spool_blocks(found: Validation) -> list[Block]:
     """The largest RRMSE of the spool commands of the closed loop."""
-    rows = [(p.test, a) for p in found.phases for a in (*p.of("spool_command"), *p.of("spool_command_b")) if a.moves]
-    if not rows:
+    worst = worst_of(found, 3, ("spool_command", "spool_command_b"))
+    if worst is None:
         return []
-    test, worst = max(rows, key=lambda row: row[1].rrmse_aligned)
-    where = f"({test}, {worst.column})"
-    return [f"Spool commands of the closed loop: largest RRMSE {percent(worst.rrmse_aligned)} {where}."]
+    phase, one = worst
+    where = f"({phase.test}, {one.column})"
+    return [f"Spool commands of the closed loop: largest RRMSE {percent(one.rrmse_aligned)} {where}."]
 
 
 def _residual_blocks(found: Validation) -> list[Block]:
@@ -181,10 +181,14 @@ def _mean_cell(one: ColumnAgreement) -> str:
     return f"{'! ' * beyond}{number(one.offset * scale_of(one.quantity, one.column).factor)}"
 
 
+def _shade(one: ColumnAgreement) -> int:
+    """Number of the shade of a cell, by its RRMSE."""
+    return next(k for k, top in enumerate(_SHADES) if not one.rrmse_aligned > top)
+
+
 def _cell(one: ColumnAgreement, worst: bool) -> Markup:
     if one.moves:
-        shade = next(k for k, top in enumerate(_SHADES) if not one.rrmse_aligned > top)
-        return shaded(f"{'▲ ' * worst}{percent(one.rrmse_aligned)}", shade)
+        return shaded(f"{'▲ ' * worst}{percent(one.rrmse_aligned)}", _shade(one))
     if one.quantity == "displacement":
         return text(f"{number(1e6 * one.error, 2)}\N{NO-BREAK SPACE}{'µrad' if one.column in ROTATIONS else 'µm'}")
     if not np.isfinite(one.error_to_noise):

@@ -14,6 +14,7 @@ from urllib.request import Request, urlopen
 import numpy as np
 import pytest
 from browser import BROWSER, Tab, browse
+from commands import script
 from tornado.websocket import websocket_connect
 
 from lhpost6_pin.data.records import load_record
@@ -383,6 +384,14 @@ def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
     assert browse(tmp_path, panel.url, look, (1300, 900), 4 * PATIENCE) == []
     (recording,) = panel.folder.glob("*.nc")
     assert np.abs(load_record(recording)["platen_displacement"].values[:, 0]).max() > 0.02
+
+
+@pytest.mark.slow
+def test_a_script_measures_how_a_panel_keeps_time(tmp_path):
+    ended = script("panel_pace.py", "--minutes", "0.05", "--no-page", "--out", tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    found = json.loads((tmp_path / "panel_pace.json").read_text())
+    assert found["samples"] > 0 and found["program"] == "running" and found["trip"] is None
 
 
 @pytest.mark.fast

@@ -14,7 +14,7 @@ from urllib.request import Request, urlopen
 import numpy as np
 import pytest
 from browser import BROWSER, Tab, browse
-from commands import script
+from test_scripts import script
 from tornado.websocket import websocket_connect
 
 from lhpost6_pin.data.records import load_record

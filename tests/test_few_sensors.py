@@ -282,7 +282,7 @@ def test_delay_and_lag_have_an_interval_as_a_sum_where_the_spool_is_not_measured
     ((names, total),) = sums(blind).items()
     assert names == (delay.name, lag.name) and total.unit == "s"
     assert total.value == pytest.approx(delay.at(0.1) + 2e-3)
-    half = interval_reach(discovery_numbers()[0]) * sd * np.sqrt(2.0 * (1.0 - alike))
+    half = interval_reach(discovery_numbers()[0].number("verdict.probability")) * sd * np.sqrt(2.0 * (1.0 - alike))
     assert (total.low, total.high) == pytest.approx((total.value - half, total.value + half))
     assert sums({*blind, "spool_position"}) == {}
 

@@ -12,7 +12,6 @@ from ..identification.calibration import FreeParameter
 from ..identification.calibration.normal_equations import bounds_of
 from ..identification.calibration.sensor_errors import SensorUnknown
 from ..machine.library import find_family
-from ..machine.parameters import Parameters
 from .candidates import Candidate, attributed
 from .search_state import AddedEffect, Search
 
@@ -116,7 +115,7 @@ def covariance_of(found: Search) -> Array:
             if parameter.name.startswith(f"{one.candidate.name}."):
                 stated = parameter.value if parameter.form == "shift" else 1.0
                 floor[i] = found.numbers.number("lengths.form") * stated if one.from_lengths else 0.0
-    return np.asarray(np.linalg.inv(found.solution.normal.posterior(problem.prior)) + np.diag(floor**2))
+    return found.covariance + np.diag(floor**2)
 
 
 def deviations(found: Search) -> Array:
@@ -124,15 +123,15 @@ def deviations(found: Search) -> Array:
     return np.asarray(np.sqrt(np.diag(covariance_of(found))))
 
 
-def interval_reach(numbers: Parameters) -> float:
-    """Half width of the intervals of `verdict.probability`, in standard deviations."""
-    return float(ndtri(0.5 + 0.5 * numbers.number("verdict.probability")))
+def interval_reach(probability: float) -> float:
+    """Half width of an interval that holds the truth with a probability, in standard deviations."""
+    return float(ndtri(0.5 + 0.5 * probability))
 
 
 def estimates_of(found: Search, sd: Array) -> dict[str, Estimate]:
     """All unknowns by name, in their units, with intervals by their standard deviations (p,), `deviations`."""
     every: Sequence[FreeParameter | SensorUnknown] = [*found.problem.parameters, *found.problem.unknowns]
-    reach = interval_reach(found.numbers) * sd
+    reach = interval_reach(found.numbers.number("verdict.probability")) * sd
     out = {}
     for one, x, half in zip(every, found.solution.x.tolist(), reach.tolist(), strict=True):
         values = [x, x - half, x + half]
@@ -151,6 +150,7 @@ def sums_of(found: Search, covariance: Array) -> dict[tuple[str, str], Estimate]
     problem = found.problem
     place = {p.name: i for i, p in enumerate(problem.parameters)}
     channels, machine = problem.tests[0].channels, problem.machine
+    reach = interval_reach(found.numbers.number("verdict.probability"))
     sums = {}
     for name, entry in machine.parameters.effects.items():
         family = find_family(entry.family)
@@ -164,6 +164,6 @@ def sums_of(found: Search, covariance: Array) -> dict[tuple[str, str], Estimate]
                 both, x = [problem.parameters[i] for i in pair], found.solution.x[pair].tolist()
                 slope = np.array([one.slope(at) for one, at in zip(both, x, strict=True)])
                 value = sum(one.at(at) for one, at in zip(both, x, strict=True))
-                half = interval_reach(found.numbers) * float(np.sqrt(slope @ covariance[np.ix_(pair, pair)] @ slope))
+                half = reach * float(np.sqrt(slope @ covariance[np.ix_(pair, pair)] @ slope))
                 sums[first, second] = Estimate(value, both[0].unit, value - half, value + half)
     return sums

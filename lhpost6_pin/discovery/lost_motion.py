@@ -19,6 +19,7 @@ from ..data.alignment import align_record, group_delays
 from ..data.consistency import scaled_inverse
 from ..data.sensor_pairs import LooseLength, loose_lengths
 from ..data.sensors import SENSOR, SensorSet
+from ..identification.calibration.expected_scatter import noise_at
 from ..identification.calibration.fit import solve
 from ..identification.prepare import HALF_PLAY, ROD_LENGTH
 from ..machine.library import find_family, in_size_of
@@ -153,7 +154,7 @@ def with_lost_motion(found: Search, lost: Sequence[LostMotion], progress: Progre
 
 def _reweighed(before: Search, found: Search, progress: Progress) -> Search:
     """The search weighed by its noise: with play, that of lengths and poses is in the flows."""
-    noise = [one.problem.noise_at(one.solution.x) for one in (before, found)]
+    noise = [noise_at(one.problem, one.solution.x) for one in (before, found)]
     normal = found.solution.normal.reweighed(*noise)
     rest = found.calibration, found.solution.x, progress, normal
     return replace(found, problem=normal.problem, solution=solve(normal.problem, *rest, frugal=True, settled=True))

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.progress import Progress, between, split
+from ..identification.calibration.expected_scatter import noise_at
 from ..identification.calibration.fit import solve
 from ..identification.calibration.normal_equations import NoiseBias, NormalEquations
 from ..identification.calibration.problem import Problem
@@ -35,7 +36,7 @@ def refit(
     """
     zero = np.zeros(len(problem.prior))
     first = solve(problem, calibration, zero, between(progress, 0.0, 0.85), first=begin, frugal=True)
-    normal = first.normal.reweighed(problem.noise_at(zero), problem.noise_at(first.x))
+    normal = first.normal.reweighed(noise_at(problem, zero), noise_at(problem, first.x))
     part = between(progress, 0.85, 1.0)
     solution = solve(normal.problem, calibration, first.x, part, normal, frugal=True, settled=True)
     return Search(normal.problem, solution, solution, numbers, calibration)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from ..core.arrays import Array, Complex, Mask
 from ..core.progress import Progress
 from ..identification.calibration.bin_rows import BinRows, row_by_column
+from ..identification.calibration.expected_scatter import covariance_of_estimate, scatter_factor
 from ..identification.calibration.fit import Solution, misfit, objective, solve
 from ..identification.calibration.free_parameters import with_parameters
 from ..identification.calibration.normal_equations import NormalEquations, bounds_of, positive
@@ -115,6 +117,12 @@ class Search:
         normal = normal if was.bias is None else normal.less(was.bias)
         solution = self.solution._replace(x=x, at=x, normal=normal.released(), residual=normal.residual)
         return replace(self, solution=solution, without={})
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance (p, p) of the unknowns by the expected scatter, the priors of effects' own parameters flat."""
+        normal = self.solution.normal
+        return covariance_of_estimate(normal, scatter_factor(normal, self.solution.at))
 
     @property
     def bare(self) -> "Search":

@@ -85,7 +85,7 @@ def judge(
         for one in found.added
         if one.candidate.release == u.name
     )
-    reach = interval_reach(numbers)
+    reach = interval_reach(numbers.number("verdict.probability"))
     sensors = (*(_of_fault(f, reach) for f in faults), *released)
     known = {one.name for one in sensors}
     late = [d for d in problem.delays if d.beyond(calibration.number("report.deviations"))]
@@ -96,7 +96,7 @@ def judge(
     unproven = {one.name for one in withdrawn if one.why == "held_out"}
     others = {s.name for s in released} | rescaled | unproven
     kept = [one for one in found.added if one.candidate.name not in others]
-    sure = np.abs(x) > calibration.number("report.deviations") * sd
+    sure = np.abs(x) > interval_reach(1.0 - numbers.number("verdict.chance") / len(problem.parameters)) * sd
     material = np.abs(x) > calibration.number("report.material") * problem.stated
     differs = {p.name for i, p in enumerate(problem.parameters) if sure[i] and material[i]}
     differs -= {name for name in differs if name.startswith(own) or name in problem.free}

@@ -7,7 +7,7 @@ sensor noise. The derivatives J of r are noisy, too, since every term of an equa
 would be biased towards zero (errors in variables). The contributions of noise to J^T r and J^T J, known from simulated
 draws, are subtracted (corrected normal equations, Fuller: Measurement Error Models, Wiley 1987, chapter 3). Where the
 final residual exceeds noise (in a column of a test, in a band), the excess counts as noise: it is weighed less, and
-predicted deviations grow. The inverse of the normal matrix is the predicted covariance, with a floor on its deviations.
+predicted deviations grow. The predicted covariance (`expected_scatter`) has a floor on its deviations.
 """
 
 from collections.abc import Sequence
@@ -25,6 +25,7 @@ from ...machine.machine import Machine
 from ...machine.parameters import Parameters
 from ..residuals import RESIDUALS
 from .curves import measured_curves
+from .expected_scatter import covariance_of_estimate, scatter_factor
 from .friction_forms import compare_friction
 from .normal_equations import NoiseBias, NormalEquations, bounded_step
 from .prepare import prepare_problem
@@ -72,6 +73,7 @@ def calibrate(
     found = solve(problem, numbers, np.zeros(len(problem.prior)), between(report, 0.1, 0.8))
     normal, floor = found.normal, numbers.number("fit.floor") * problem.prior
     draws = problem.noisy[: int(numbers.number("simulation.draws")) * len(records)]
+    factor = scatter_factor(normal, found.at)
     simulated = by_simulation(problem, draws, found.x, numbers, between(report, 0.8, 1.0))
     report(1.0)
     return Calibration(
@@ -85,9 +87,9 @@ def calibrate(
         unknowns=problem.unknowns,
         prior=problem.prior,
         estimate=found.x,
-        covariance=np.asarray(np.linalg.inv(normal.posterior(problem.prior)) + np.diag(floor**2), np.float64),
+        covariance=covariance_of_estimate(normal, factor) + np.diag(floor**2),
         alone=np.hypot(normal.alone(problem.prior), floor),
-        subsets=(*subset_estimates(problem, normal, found.at, floor, numbers), *([simulated] if simulated else [])),
+        subsets=(*subset_estimates(normal, found.at, factor, floor, numbers), *([simulated] if simulated else [])),
         misfit_before=found.misfit_before,
         misfit_after=misfit(problem, found.residual),
         rounds=found.rounds,

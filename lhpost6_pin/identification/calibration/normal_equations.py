@@ -100,6 +100,10 @@ class NormalEquations:
         more, side = self.correction(tests, columns)
         return matrix - more, right - side
 
+    def right_side(self, residual: Sequence[Complex]) -> Array:
+        """Right side (p,) of all tests for whitened bins (m, c) of each in place of its residual, not corrected."""
+        return np.sum([_dot(*one, None) for one in zip(self.rows, residual, self.power, strict=True)], axis=0)
+
     def correction(self, tests: Sequence[int], columns: Mask | None = None) -> tuple[Array, Array]:
         """Contributions of noise to matrix (p, p) and right side (p,), which `of` subtracts; zero if not corrected."""
         count = len(self.slope[0])

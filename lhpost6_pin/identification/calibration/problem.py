@@ -26,7 +26,7 @@ from .free_parameters import FreeParameter, parameter_changes
 from .parameters_of_tests import parameters_of_tests
 from .scale import find_scale, without_held
 from .sensor_errors import RemovedDelay, SensorUnknown, corrected, sensor_unknowns
-from .whitened_residuals import make_whitener, mean_squares, spectrum_of
+from .whitened_residuals import make_whitener, spectrum_of
 
 __all__ = ["KINDS", "OperatingPoint", "ResidualBands", "Problem", "Slopes", "EvaluationGroup"]
 
@@ -179,15 +179,11 @@ class Problem:
             whitener=self.whitener._replace(factor=self.whitener.factor[list(places)]),
         )
 
-    def noise_at(self, x: Array) -> Array:
-        """Mean squares (t, b, c) of whitened noise with the unknowns at x."""
+    def noise_draws(self, x: Array) -> list[list[Complex]]:
+        """Whitened bins (m, c) of every test by which each draw of noise changes its residuals, the unknowns at x."""
         plant = self.plant_at(x)
         noise = self._noise(plant, [evaluate_residuals(plant, test, self.kinds) for test in self.tests])
-        found = np.zeros((len(self.tests), len(self.whitener.edges) - 1, sum(self.widths)))
-        for t, (draws, f) in enumerate(zip(noise, self.frequency, strict=True)):
-            squares = np.mean([np.abs(self._whitened(t, bins)) ** 2 for bins in draws], axis=0)
-            found[t, np.unique(self.whitener.band(f))] = mean_squares(self.whitener, squares, f)[0]
-        return found
+        return [[self._whitened(t, bins) for bins in draws] for t, draws in enumerate(noise)]
 
     def _noise(self, plant: Plant, clean: Sequence[Residuals]) -> list[list[Complex]]:
         """Change of the bins (m, c) of every test with each draw of noise."""

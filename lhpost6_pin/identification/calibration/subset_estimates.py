@@ -7,9 +7,9 @@ with the prior's matrix P:
 
 B is the correction that H and g are less, a mean over n simulated draws. This is the covariance of corrected normal
 equations (Fuller: Measurement Error Models, Wiley 1987, chapter 3) with the sampling of B in it; it is A where the
-derivatives have no noise. In all residuals together derivatives are mostly signal, and A serves. In a single group some
-are mostly noise: A would be far too small. Along an eigenvector of H with a negative eigenvalue the correction exceeds
-the signal: that direction, of right side and matrix alike, is left to the prior.
+derivatives have no noise. In a single group some of them are mostly noise: A would be far too small. Along an
+eigenvector of H with a negative eigenvalue the correction exceeds the signal: that direction, of right side and matrix
+alike, is left to the prior.
 """
 
 from collections.abc import Iterator
@@ -27,17 +27,20 @@ __all__ = ["estimate_by", "subset_estimates"]
 
 
 def subset_estimates(
-    problem: Problem, normal: NormalEquations, x: Array, floor: Array, numbers: Parameters
+    normal: NormalEquations, x: Array, factor: Array, floor: Array, numbers: Parameters
 ) -> tuple[Subset, ...]:
     """Estimates from the wrench along each axis, flows of each kind of actuator, and gas law alone, about x (p,).
 
-    NaN where the predicted deviation exceeds `report.informative` of the prior's; no deviation is below `floor` (p,).
+    Predicted deviations have the factors (p,) of the joint estimate's (`expected_scatter`). NaN where they exceed
+    `report.informative` of the prior's; none is below `floor` (p,).
     """
+    problem = normal.problem
     found, tests = [], range(len(normal.residual))
     for name, columns in _groups(problem):
         matrix, right = normal.of(tests, columns)
         noise = normal.correction(tests, columns)[0]
         estimate, sd = estimate_by(matrix, right, noise, len(problem.again), x, problem.prior)
+        sd = factor * sd
         known = sd < numbers.number("report.informative") * problem.prior
         found.append(Subset(name, np.where(known, estimate, np.nan), np.where(known, np.hypot(sd, floor), np.nan)))
     return tuple(found)

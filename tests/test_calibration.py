@@ -22,6 +22,7 @@ from lhpost6_pin.identification.calibration import (
     with_parameters,
 )
 from lhpost6_pin.identification.calibration.calibration_summary import chance, compared
+from lhpost6_pin.identification.calibration.expected_scatter import noise_at
 from lhpost6_pin.identification.calibration.fit import solve
 from lhpost6_pin.identification.calibration.free_parameters import FreeParameter, plan_parameters, scatter_parameters
 from lhpost6_pin.identification.calibration.normal_equations import bounded_step, bounds_of
@@ -354,7 +355,7 @@ def test_pressures_that_stand_in_for_forces_show_in_the_wrench(seen, machine, se
 
 def test_softer_oil_makes_more_noise_in_flows_alone(problem, seen):
     soft = -2.0 * problem.prior * (np.array(problem.names) == "hydraulics.bulk_modulus")
-    stiff, now = (problem.noise_at(x)[0] for x in (np.zeros(len(soft)), soft))
+    stiff, now = (noise_at(problem, x)[0] for x in (np.zeros(len(soft)), soft))
     share = soft[problem.names.index("hydraulics.bulk_modulus")]
     factor = (1.0 + share) ** -2  # of power: that of L A / beta squared
     bands = slice(2, None)  # below, other noise than that of the pressures' rates counts

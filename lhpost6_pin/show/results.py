@@ -181,7 +181,14 @@ def agreement_entries(found: "Decomposed", agreement: "WrenchAgreement") -> Entr
     axes = {}
     for k in found.plant.axes:
         forces = {
-            name: None if one is None else {"rrmse": one.rrmse[k], "rrmse_mean_off": one.rrmse_varying[k]}
+            name: None
+            if one is None
+            else {
+                "rrmse": one.rrmse[k],
+                "rrmse_mean_off": one.rrmse_varying[k],
+                "rms_difference": one.difference[k],
+                "at_rest": bool(one.at_rest[k]),
+            }
             for name, one in matches.items()
         }
         own = {name: values[k] for name, values in residual.items()}

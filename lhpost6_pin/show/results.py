@@ -163,7 +163,8 @@ def sine_entries(found: "SineTest") -> Entries:
 
     results = {"alone": found.before, "with_cancellers": found.after}
     both = {when: {**_picked(one, *names), "clipped": one.run.clipped} for when, one in results.items()}
-    return _picked(found, "axis", "amplitude", "frequency") | both
+    highest = {"cancelled_up_to_hz": found.cancelled * found.frequency}
+    return _picked(found, "axis", "amplitude", "frequency") | highest | both
 
 
 def agreement_entries(found: "Decomposed", agreement: "WrenchAgreement") -> Entries:

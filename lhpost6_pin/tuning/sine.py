@@ -197,8 +197,8 @@ def sine_test(
         found.append(_evaluate(run, target, AXES.index(axis), frequency, measured, counted))
         if progress is not None:
             progress((n + 1) / 2)
-    cancelled = len(adaptive.canceller)
-    return SineTest(settings, target, axis, amplitude, frequency, measured, *found, cancelled, count)
+    cancelled, (before, after) = len(adaptive.canceller), found
+    return SineTest(settings, target, axis, amplitude, frequency, measured, before, after, cancelled, count)
 
 
 def _evaluate(run: Run, target: Target, k: int, frequency: float, measured: slice, count: int) -> SineResult:

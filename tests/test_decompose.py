@@ -57,7 +57,7 @@ def test_a_simulated_record_at_the_model_step_comes_apart_exactly_and_slower_as_
     assert exact.sensors is None and left < 1e-8  # stated bound; 1e-14 found
     assert 1e-8 < slower < 1e-3  # friction marched with steps four times as long
     agreement = find_agreement(exact)
-    assert (agreement.actuators.rrmse < 1e-8).all() and not agreement.noise.any()
+    assert np.nanmax(agreement.actuators.rrmse) < 1e-8 and not agreement.noise.any()
     assert set(agreement.varying_explained) == {"none needed"}
 
 

@@ -1,5 +1,6 @@
 """Many files and folders at once: each a test of a campaign, and what cannot be read is said."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,11 @@ from commands import refused
 from lhpost6_pin.core.errors import RecordError
 from lhpost6_pin.data.campaign import load_campaign
 from lhpost6_pin.data.importing import find_tests
+from lhpost6_pin.data.records import load_record, save_record
 from lhpost6_pin.machine.machine import load_machine
 
 TIME = np.arange(300) / 256
+PRACTICE = Path(__file__).parent / "data" / "records" / "practice_a_TX.nc"
 UNIAXIAL = ("--machine", "uniaxial")
 
 
@@ -91,3 +94,19 @@ def test_names_of_tests_tell_them_apart(tmp_path, campaign):
     (tmp_path / "empty").mkdir()
     with pytest.raises(RecordError, match="empty: holds no data file; name the folder of the data files"):
         find_tests([tmp_path / "empty"])
+
+
+def test_an_import_warns_of_redundant_sensors_that_contradict_each_other_as_a_check_does(lhpost6, tmp_path):
+    record = load_record(PRACTICE)
+    record["actuator_displacement"].loc[{"actuator": "H2"}] *= 25.0
+    (folder := tmp_path / "tests").mkdir()
+    save_record(record, tmp_path / "TX.nc")
+    assert lhpost6("export", tmp_path / "TX.nc", "--to", "csv", "--out", folder / "TX.csv").code == 0
+    imported = lhpost6("import", folder / "TX.csv", "--out", tmp_path / "again.nc")
+    checked = lhpost6("check", tmp_path / "again.nc")
+    (words,) = (line for line in checked.out.splitlines() if line.startswith("warning: actuator_displacement[H2]"))
+    assert "correct its unit or factor in the channel map" in words and words in imported.out
+    for more in ([folder / "TX.csv", "--out", tmp_path / "again.nc"], [folder, "--out", tmp_path / "campaign"]):
+        (found,) = json.loads(lhpost6("import", *more, "--json").out)["contradictions"]
+        assert f"warning: {found}" in words
+    assert words in lhpost6("import", folder, "--out", tmp_path / "campaign").out

@@ -379,6 +379,16 @@ def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
         await wait(tab, reads("recordings", "test-1.nc"))
         frame = "document.getElementById('view').contentDocument.getElementById('status')"
         await wait(tab, f"{frame}.textContent.includes('force')", "the 3-D view")
+        os.kill(panel.process.pid, signal.SIGSTOP)  # a server that falls silent: the page connects anew
+        await wait(tab, "document.body.classList.contains('lost')")
+        os.kill(panel.process.pid, signal.SIGCONT)
+        await wait(tab, reads("notice", "the controls are free: take them again"))
+        await wait(tab, reads("role", "watcher"))
+        await press(tab, "take")  # an order does not take the notice off the page
+        await wait(tab, reads("role", "operator"))
+        assert not await tab.evaluate("document.getElementById('notice-box').hidden")
+        await tab.evaluate("document.getElementById('notice-close').click()")
+        assert await tab.evaluate("document.getElementById('notice-box').hidden")
         return tab.faults
 
     assert browse(tmp_path, panel.url, look, (1300, 900), 4 * PATIENCE) == []

@@ -10,9 +10,11 @@ from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import ControllerError
 from lhpost6_pin.panel import session as session_module
 from lhpost6_pin.panel.client import Client
+from lhpost6_pin.panel.link_state import link_state
 from lhpost6_pin.panel.ring import Ring
 from lhpost6_pin.panel.session import Options, Session
-from lhpost6_pin.panel.worker import Setup, program_of
+from lhpost6_pin.panel.timekeeping import Timekeeping
+from lhpost6_pin.panel.worker import Setup, panel_numbers, program_of, rows_of
 
 MOTION = {"do": "motion", "name": "ridgecrest-ccc", "axes": "xyz"}
 SINE = {"do": "generator", "wave": "sine", "frequency": 1.0, "axes": ["x"], "cycles": 2}
@@ -71,14 +73,14 @@ class Panel:
     """A session with an operator, Anna, whose refusals are kept."""
 
     def __init__(self, machine, folder, monkeypatch):
-        self.table, self.work, self.refusals = Table(machine), Held(), []
+        self.table, self.work, self.refusals, self.notices = Table(machine), Held(), [], []
         monkeypatch.setattr(Control, "table", self.table, raising=False)
         monkeypatch.setattr(session_module, "ControlProcess", Control)
         self.table.do("pressure", to="high")
         setup = Setup(machine, load_controller("lhpost6"), folder / "ring")
         self.session = Session(setup, folder, self.work, {}, Options(("nowhere", 1)))
         self.session.look()
-        self.anna = Client("b1", self.refusals.append)
+        self.anna = Client("b1", self.refusals.append, self.notices.append)
         self.session.join(self.anna)
         self.take({"do": "name", "name": "Anna"}, {"do": "take"}, {"do": "span", "axis": "x", "value": 0.1})
         self.session.look()
@@ -86,6 +88,15 @@ class Panel:
     def take(self, *messages):
         for message in messages:
             self.session.take(self.anna, message)
+
+    def pass_time(self, seconds):
+        """The controller answers so many seconds of samples, and the session sees them."""
+        first = len(self.table.recording.rows())
+        self.table.step(seconds)
+        for row in self.table.recording.rows()[first:]:
+            self.session._control._ring.write(row)
+        self.session.look()
+        self.session.look()
 
     def refused(self, message, why):
         """Refused by the session at once, or by the controller."""
@@ -204,7 +215,7 @@ def test_another_operator_runs_only_what_his_page_states(panel):
     panel.load({**SINE, "frequency": 0.5})
     panel.take({"do": "release"})
     said = []
-    ben = Client("b2", said.append)
+    ben = Client("b2", said.append, said.append)
     panel.session.join(ben)
     for message in ({"do": "take"}, {"do": "run", "number": stated}):
         panel.session.take(ben, message)
@@ -219,3 +230,108 @@ def test_a_browser_that_leaves_just_after_run_stops_the_program(panel):
     panel.session.leave(panel.anna)  # before the session knows that it runs
     panel.session.look()
     assert panel.state.state == "stopping"
+
+
+def running(panel, **more):
+    panel.load({**SINE, **more})
+    panel.take({"do": "run"})
+    panel.session.look()
+    panel.pass_time(3.0)
+    assert panel.state.state == "running"
+
+
+def ends(panel):
+    return [f"{entry['who']}: {entry['what']}" for entry in panel.session.journal.entries if " ended " in entry["what"]]
+
+
+def test_the_end_of_every_program_is_in_the_journal_with_its_cause(panel):
+    running(panel)
+    panel.pass_time(4.0)
+    # the clock takes 2 s to its rate and 2 s to rest, in which it runs on by one: 3.0 s of its own, as the page shows
+    assert ends(panel) == ["program: sine 1 Hz ended after 3.0 s: by itself"]
+    running(panel, cycles=None)
+    panel.take({"do": "stop"})
+    panel.session.look()
+    assert len(ends(panel)) == 1  # it returns to the setpoint first
+    panel.pass_time(5.0)
+    assert ends(panel)[1:] == ["program: sine 1 Hz ended after 3.0 s: stopped by Anna"]
+    running(panel, cycles=None)
+    panel.take({"do": "trip"})
+    panel.session.look()
+    panel.pass_time(0.1)
+    assert ends(panel)[2:] == ["program: sine 1 Hz ended after 2.0 s: the table tripped"]
+    panel.pass_time(1.0)
+    assert len(ends(panel)) == 3
+
+
+def test_an_operator_whose_connection_was_lost_is_informed_on_return(panel):
+    panel.take({"do": "join", "key": "of Anna"})
+    assert panel.notices == []
+    running(panel)
+    panel.session.leave(panel.anna)
+    at = panel.session.journal.entries[-1]["time"]
+    found = {number: [] for number in ("b2", "b3")}
+    stranger, again = ((found[number], Client(number, print, found[number].append)) for number in found)
+    for (_, client), key in ((stranger, "of Ben"), (again, "of Anna")):
+        panel.session.join(client)
+        panel.session.take(client, {"do": "join", "key": key})
+    lost = f"Your connection was lost at {at}; the program sine 1 Hz was stopped, and "
+    lost += "the controls are free: take them again."
+    assert stranger[0] == [] and again[0] == [lost]
+    panel.session.take(again[1], {"do": "join", "key": "of Anna"})
+    assert again[0] == [lost]  # once: the page keeps it until it is dismissed
+
+
+def test_a_page_that_is_back_before_its_loss_is_noticed_is_informed_too(panel):
+    panel.take({"do": "join", "key": "of Anna"})
+    notices = []
+    again = Client("b2", notices.append, notices.append)
+    panel.session.join(again)
+    panel.session.take(again, {"do": "join", "key": "of Anna"})
+    assert notices == []
+    panel.session.leave(panel.anna)
+    assert len(notices) == 1 and notices[0].endswith("; the controls are free: take them again.")
+
+
+def test_who_released_the_controls_is_not_informed_of_a_loss_and_another_operator_is_named(panel):
+    panel.take({"do": "join", "key": "of Anna"}, {"do": "release"})
+    panel.session.leave(panel.anna)
+    notices = []
+    again, ben = (Client(number, notices.append, notices.append) for number in ("b2", "b3"))
+    panel.session.join(again)
+    panel.session.take(again, {"do": "join", "key": "of Anna"})
+    assert notices == []
+    panel.session.take(again, {"do": "take"})
+    panel.session.leave(again)
+    panel.session.join(ben)
+    for message in ({"do": "name", "name": "Ben"}, {"do": "take"}, {"do": "join", "key": "of Anna"}):
+        panel.session.take(ben, message)
+    assert notices[0].endswith("; Ben has the controls now.")
+
+
+def test_a_recording_is_listed_at_once_as_one_that_is_being_written(panel):
+    panel.take({"do": "record", "on": True, "name": "long"})
+    panel.pass_time(1.0)
+    panel.take({"do": "record", "on": False})
+    assert panel.session.writing == ["long"] and panel.session.recordings == []
+    panel.take({"do": "record", "on": True, "name": "long"})  # not the name of the file that is to come
+    assert panel.session.recording.name == "long-2"
+    panel.work.release()
+    assert panel.session.writing == [] and panel.session.recordings[0].endswith("long.nc")
+
+
+@pytest.mark.parametrize(
+    ("late", "own", "text", "advice"),
+    [
+        (0.001, True, "✓ on time", ""),
+        (0.012, True, "✓ 1.2 % late", ""),
+        (0.9, True, "! slow computer: 90 % late", "close other programs, or start the panel with --pace 0.5."),
+        (0.9, False, "! slow computer: 90 % late", "close other programs."),
+    ],
+)
+def test_the_sign_of_the_link_follows_the_share_of_late_samples(machine, late, own, text, advice):
+    time = Timekeeping(rows_of(machine), 1.0)
+    time.answered, time.late = 10_000, round(10_000 * late)
+    found = link_state("on", time, "of its own", own, panel_numbers())
+    assert found["text"] == text and advice in found["title"] and ("too slow" in found["title"]) == bool(advice)
+    assert link_state("lost", time, "of its own", own, panel_numbers())["text"].startswith("! lost, ")

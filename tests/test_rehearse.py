@@ -16,6 +16,7 @@ from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.valve_delay import delayed_spools
 from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.show.report.run_report import write_run_report
 from lhpost6_pin.simulation.motion_limits import check_motion_limits
 from lhpost6_pin.simulation.rehearse import rehearse, replay
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
@@ -115,12 +116,18 @@ def test_the_platen_follows_its_target(rehearsed):
     assert np.abs(record["platen_displacement"].values[:, 1]).max() < 1e-12  # by symmetry
 
 
-def test_the_record_is_thinned_without_touching_the_simulation(rehearsed):
+def test_the_record_is_thinned_without_touching_the_simulation(rehearsed, tmp_path):
     thin = rehearsal(record_every=16)
     assert thin.record.attrs["sample_rate_hz"] == 128
     for name in ("platen_displacement", "chamber_pressure_a", "spool_command", "reference_acceleration"):
         assert np.array_equal(thin.record[name].values, rehearsed.record[name].values[::16])
     assert thinned(rehearsed.record, 16).identical(thin.record)  # the same afterwards
+    assert rehearsed.record.attrs["sample_rate_hz"] == 2048  # thinning changes nothing of the whole record
+    assert thin.record.attrs["thinned_from_hz"] == 2048 and "thinned_from_hz" not in rehearsed.record.attrs
+    assert thinned(thin.record, 2).attrs["thinned_from_hz"] == 2048
+    write_run_report(thin.record, tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text()
+    assert "at 128 samples a second (thinned from 2048 without a filter: peaks" in page
     few = rehearsed.record.isel(time=slice(0, 10))
     assert thinned(few, 16).identical(few)  # a record needs two samples
 

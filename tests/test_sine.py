@@ -7,10 +7,11 @@ import pytest
 from machine_cases import plant_named
 from run_cases import with_tuning_numbers
 
-from lhpost6_pin.control import load_controller
+from lhpost6_pin.control import controlled, load_controller
 from lhpost6_pin.core.errors import SimulationError
-from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.core.names import AXES, SAMPLE_RATE
 from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.show.report.sine_report import sine_verdict
 from lhpost6_pin.simulation.motion_limits import fitting_scale
 from lhpost6_pin.tuning import identify as identify_module
 from lhpost6_pin.tuning import sine as module
@@ -36,6 +37,23 @@ def test_cancellers_bring_a_sine_to_its_amplitude_and_phase_and_halve_its_distor
     assert abs(after.amplitude_error) < abs(before.amplitude_error) or abs(before.amplitude_error) < 0.002
     assert after.displacement.amplitude[0] == pytest.approx(amplitude, rel=0.01)
     assert after.peak_spool < 1.0 and after.run.clipped == 0
+
+
+def test_no_canceller_is_where_the_response_of_pitch_turns_about_its_zeros():
+    """With pitch moves x: zeros at 31 Hz, poles at 36 Hz, where the phase differs by 60 to 125 degrees."""
+    _, _, alone = controlled(load_machine(), load_controller("lhpost6"))
+    highest = {axis: 0.5 * len(with_cancellers(alone, axis, 0.5, 66, 3.0).canceller) for axis in AXES}
+    assert highest == {"x": 33, "y": 33, "z": 33, "roll": 33, "pitch": pytest.approx(29.0, abs=1.0), "yaw": 33}
+    single = with_cancellers(alone, "pitch", 32.0, 1, 3.0)
+    assert len(single.canceller) == 1  # the fundamental always has one
+
+
+def test_cancellers_of_pitch_are_stable():
+    """One of 32 Hz, the eighth multiple, grew until an actuator reached its stop."""
+    test = sine_test(load_machine(), load_controller("lhpost6"), axis="pitch", amplitude=0.001, frequency=4.0)
+    assert abs(test.after.amplitude_error) < 0.001 and test.after.distortion < 0.1 * test.before.distortion
+    assert (test.cancelled, test.wanted) == (7, 8)
+    assert "Harmonics above 28.0 Hz have no canceller" in sine_verdict(test, {})[0]
 
 
 @pytest.mark.parametrize("amplitude, frequency", [(0.1, 1.0), (0.75, 0.5), (0.02, 3.3)])

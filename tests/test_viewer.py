@@ -4,6 +4,7 @@ import asyncio
 import base64
 import gc
 import html
+import json
 import logging
 import os
 import re
@@ -26,13 +27,14 @@ from tornado.websocket import websocket_connect
 
 from lhpost6_pin.core.errors import LhpostError, ParameterError, RecordError
 from lhpost6_pin.core.names import AXES
-from lhpost6_pin.data.records import load_record, make_record
+from lhpost6_pin.data.records import load_record, make_record, save_record
 from lhpost6_pin.show.bodies import body_name, body_poses, joint_positions, load_bodies, load_specimen_bodies
 from lhpost6_pin.show.urdf import legs
 from lhpost6_pin.show.viewer import (
     Look,
     LoopbackWindow,
     Recorder,
+    compare_overlaid,
     live_animation,
     make_frames,
     record_frames,
@@ -202,6 +204,40 @@ def test_a_body_without_shapes_is_the_uniform_box_of_its_inertia(tmp_path, machi
     path.write_text(mesh)
     (shape,) = load_specimen_bodies(machine.with_specimen(path)).shapes
     np.testing.assert_allclose(np.sort(2.0 * shape.geometry.halfSide), edges)
+
+
+def test_what_two_records_leave_out_of_each_other_is_stated_and_another_test_is_warned_of(machine, record):
+    short, late = record.isel(time=slice(0, 4096)), record.isel(time=slice(512, None))
+    first, last = late["time"].values[0], short["time"].values[-1]
+    found = compare_overlaid(short, [late], ["short.nc", "late.nc"])
+    assert found.shown == (first, last) and found.different == ()  # the same motion
+    only = f"only {first:.2f} to {last:.2f} s, which all records have, are shown"
+    more = late["time"].values[-1] - last
+    start = first - short["time"].values[0]
+    assert found.cut == (
+        f"short.nc is cut by {start:.2f} s at its start: {only}",
+        f"late.nc is cut by {more:.2f} s at its end: {only}",
+    )
+    assert (
+        html.escape(found.sentences[0].replace("short.nc", record.attrs["title"]))
+        in show_record(machine, short, [late]).page
+    )
+    whole = compare_overlaid(record, [record.assign_attrs(test="scaled")])
+    assert whole.sentences == ()
+
+
+def test_records_of_different_motions_are_not_the_same_test(record):
+    scaled, turned, still = record.copy(deep=True), record.copy(deep=True), record.copy(deep=True)
+    for name in ("reference_displacement", "platen_displacement"):
+        if name in record:
+            scaled[name] = 0.5 * record[name]
+            turned[name] = (record[name].dims, record[name].values[::-1])
+            still[name] = 0.0 * record[name]
+    found = compare_overlaid(record, [scaled, turned, still], ["a", "scaled", "turned", "still"])
+    assert len(found.different) == 2 and found.different[0].startswith("turned is not the same test as a: the corr")
+    assert found.different[1] == "still is not the same test as a: one of them is at rest"
+    named = compare_overlaid(record.assign_attrs(motion="sine"), [record.assign_attrs(motion="kobe")], ["a", "b"])
+    assert named.different == ("b is not the same test as a: its motion is kobe, not sine",)
 
 
 def test_two_records_are_drawn_over_the_time_that_both_have(machine, record):
@@ -394,12 +430,19 @@ def test_the_page_says_what_was_changed_of_the_machine(machine, record):
     assert "made with overrides: a.b = 1 m (was 2 m); c; and 2 more" in page
 
 
-def test_the_command_writes_one_file_and_says_what_it_cannot_show(lhpost6, record, tmp_path):
+def test_the_command_writes_one_file_and_says_what_it_cannot_show(lhpost6, record, tmp_path, caplog):
     page = tmp_path / "page.html"
     ended = lhpost6("view", RECORD, RECORD, "--export", page, "--amplify", 20, "--fps", 10, "--gap", 2)
     assert ended.code == 0 and f"wrote {page}" in ended.out
     text = page.read_text()
+    assert "not the same test" not in caplog.text and "is cut" not in caplog.text
     assert "drawn 20 times as large, gaps to the outlines 2 times as large" in text and "10 frames/s" in text
+    short, found = tmp_path / "short.nc", tmp_path / "found.html"
+    save_record(record.isel(time=slice(0, 4096)), short)
+    ended = lhpost6("view", RECORD, short, "--export", found, "--json")
+    entries = json.loads(ended.out)
+    assert entries["different"] == [] and len(entries["cut"]) == 1 and entries["cut"][0].startswith(str(RECORD))
+    assert "is cut by" in caplog.text and entries["shown"][1] == record["time"].values[4095]
     for wrong, why in (
         ([tmp_path / "none.nc"], "none.nc: no such file"),
         ([RECORD, "--machine", "hexapod"], "hexapod"),

@@ -1,7 +1,7 @@
 """The command `import`: measured data of one test, or of many, as records."""
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -100,9 +100,11 @@ def _mapped(raws: "Sequence[RawTest]", table: "Machine", map_: Path | None, file
 
 def _import_one(files: Sequence[Path], table: "Machine", map_: Path | None, out: Path | None, json: bool) -> None:
     """Import the files of one test, and print source and range of every channel, which expose a wrong unit."""
+    from ..data.campaign_check import contradicting_sensors
     from ..data.check import check_dataset
     from ..data.importing import channel_units, described_sources, load_raw, make_imported_record
     from ..data.records import save_record
+    from ..show.check_tables import print_contradictions
     from ..show.results import finding_entries
     from ..show.tables import print_findings
 
@@ -113,6 +115,7 @@ def _import_one(files: Sequence[Path], table: "Machine", map_: Path | None, out:
     _refuse_own(path, files)
     save_record(record, path)
     sources, findings = described_sources(raws, channels), check_dataset(record, table)
+    contradictions = contradicting_sensors(table, _sound([(record, findings)]))
     entries = {
         name: {"from": sources[name], "unit": unit, "least": values.min(), "most": values.max()}
         for name, unit, values in channel_units(record)
@@ -131,15 +134,27 @@ def _import_one(files: Sequence[Path], table: "Machine", map_: Path | None, out:
             rows.add_row(*map(escape, cells))
         make_console().print(rows)
         print_findings(str(path), findings)
+        print_contradictions(contradictions)
 
-    print_result(json, lambda: {**finding_entries({str(path): findings}), "channels": entries}, show, [path])
+    def all_entries() -> dict[str, Any]:
+        return {**finding_entries({str(path): findings}), "contradictions": contradictions, "channels": entries}
+
+    print_result(json, all_entries, show, [path])
+
+
+def _sound(made: "Collection[tuple[xr.Dataset, Sequence[RecordFinding]]]") -> "list[xr.Dataset]":
+    """Records without errors, by which redundant sensors are compared; all of them where each has one."""
+    sound = [record for record, findings in made if not any(one.severity == "error" for one in findings)]
+    return sound or [record for record, _ in made]
 
 
 def _import_many(files: Sequence[Path], table: "Machine", map_: Path | None, out: Path | None, json: bool) -> None:
     """Import each file as a test of a campaign; one that cannot be read is passed over and said, with exit code 1."""
+    from ..data.campaign_check import contradicting_sensors
     from ..data.check import check_dataset
     from ..data.importing import find_tests, load_raw, make_imported_record
     from ..data.records import save_record
+    from ..show.check_tables import print_contradictions
     from ..show.results import finding_entries
 
     tests = find_tests(files)
@@ -162,12 +177,17 @@ def _import_many(files: Sequence[Path], table: "Machine", map_: Path | None, out
         made[path] = record, check_dataset(record, table)
     if not made:
         raise RecordError(next(iter(failed.values())))
+    contradictions = contradicting_sensors(table, _sound(made.values()))
 
     def entries() -> dict[str, Any]:
         said = finding_entries({str(path): findings for path, (_, findings) in made.items()})
-        return {**said, "not imported": failed}
+        return {**said, "contradictions": contradictions, "not imported": failed}
 
-    print_result(json, entries, lambda: _show_many(made, failed), list(made))
+    def show() -> None:
+        _show_many(made, failed)
+        print_contradictions(contradictions)
+
+    print_result(json, entries, show, list(made))
     if failed:
         raise typer.Exit(1)
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from ..machine.machine import Machine
+    from ..show.viewer import Look, Overlay
 
 log = logging.getLogger(__name__)
 
@@ -47,15 +48,27 @@ def view(
     look = Look(fps, options.amplify, gap, options.force_change)
     if export is not None:
         show_record(table, test, over, look).save(export)
+        overlay = _overlay(test, over, [record, *(others or [])], look)
         size = export.stat().st_size / 1e6
-        print_result(json, dict, lambda: typer.echo(f"{size:.1f} MB, which any browser plays"), [export])
+        print_result(json, overlay.entries, lambda: typer.echo(f"{size:.1f} MB, which any browser plays"), [export])
         return
     with live_animation(table, test, over, look) as window:
+        _overlay(test, over, [record, *(others or [])], look)
         show_address(window.url, f"{record} on this computer only; Ctrl-C ends", not options.no_open)
         try:
             threading.Event().wait()
         except KeyboardInterrupt:
             typer.echo("ended")
+
+
+def _overlay(test: "xr.Dataset", over: "list[xr.Dataset]", paths: list[Path], look: "Look") -> "Overlay":
+    """What records shown together leave out, and which are of another test; a warning of each."""
+    from ..show.viewer import compare_overlaid
+
+    found = compare_overlaid(test, over, [str(path) for path in paths], 1.0 / look.rate)
+    for sentence in found.sentences:
+        log.warning("%s", sentence)
+    return found
 
 
 def _mounted(machine: SpecimenOptions, test: "xr.Dataset", record: Path) -> "Machine":

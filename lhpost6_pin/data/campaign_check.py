@@ -17,7 +17,7 @@ from .observable import Observable, observable
 from .records import is_measured
 from .sensors import SensorSet, load_sensors, make_sensors
 
-__all__ = ["CampaignCheck", "check_campaign"]
+__all__ = ["CampaignCheck", "check_campaign", "contradicting_sensors"]
 
 WRONG = 1.5
 """Factor of a gain, either way, beyond which a unit or a factor of a channel map is wrong rather than a calibration."""
@@ -96,6 +96,15 @@ def check_campaign(machine: Machine, records: Sequence[xr.Dataset], sensors: str
         content=content,
         reason=reason,
     )
+
+
+def contradicting_sensors(machine: Machine, records: Sequence[xr.Dataset]) -> tuple[str, ...]:
+    """`CampaignCheck.contradictions` of records; none where these show no noise to compare by."""
+    try:
+        found = check_campaign(machine, records)
+    except RecordError:
+        return ()
+    return found.contradictions if found else ()
 
 
 def _of(machine: Machine, record: xr.Dataset) -> bool:

@@ -14,6 +14,7 @@ import xarray as xr
 
 from ..core.arrays import Array
 from ..core.errors import RecordError
+from .at_rest import at_rest
 from .signals import Band, align, delay_within, rrmse
 
 __all__ = [
@@ -104,7 +105,8 @@ def commanded_axes(record: xr.Dataset) -> list[str]:
         return []
     motion = channel(record, name)
     size = np.nan_to_num(peaks(motion - motion[0]))
-    return [axis for axis, peak in zip(labels(record, "axis"), size, strict=True) if peak > COMMANDED * size.max()]
+    commanded = (size > COMMANDED * size.max()) & ~at_rest(motion - motion[0], place=True)
+    return [axis for axis, moves in zip(labels(record, "axis"), commanded, strict=True) if moves]
 
 
 def track(record: xr.Dataset, quantity: str, *, errors: bool = True) -> list[Tracking]:

@@ -180,12 +180,16 @@ def make_record(
 
 
 def thinned(record: xr.Dataset, every: int) -> xr.Dataset:
-    """Every `every`-th sample of a record, unfiltered; all samples of one too short to keep two."""
+    """Every `every`-th sample of a record, unfiltered; all samples of one too short to keep two.
+
+    Its attribute `thinned_from_hz` is the rate before.
+    """
     if every == 1 or record.sizes["time"] <= every:
         return record
     kept = record.isel(time=slice(None, None, every))
-    kept.attrs["sample_rate_hz"] = float(f"{sampling_rate(kept['time'].values):.9g}")
-    return kept
+    before = record.attrs.get("thinned_from_hz", record.attrs["sample_rate_hz"])
+    rate = float(f"{sampling_rate(kept['time'].values):.9g}")
+    return kept.assign_attrs(sample_rate_hz=rate, thinned_from_hz=before)  # a copy: both may share their attributes
 
 
 def _variable(dims: Any, values: ArrayLike, attrs: Mapping[str, Any] | None = None) -> xr.Variable:

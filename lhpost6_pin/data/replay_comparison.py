@@ -8,14 +8,13 @@ import numpy as np
 import xarray as xr
 
 from ..core.arrays import Array
+from .at_rest import at_rest
 from .channels import LAYOUT, channel_unit
 from .signals import drift_rate, rrmse
 
 __all__ = ["Compared", "Paired", "compare", "paired"]
 
 _COMPARED = ("platen_displacement", "chamber_pressure_a", "chamber_pressure_b", "actuator_force")
-_SILENT = 1e-6
-"""Fraction of the largest peak of its kind below which a channel is at rest and has no relative error."""
 
 
 class Paired(NamedTuple):
@@ -59,8 +58,8 @@ def compare(measured: xr.Dataset, simulated: xr.Dataset) -> list[Compared]:
         step = float(measured["time"][1] - measured["time"][0])
         apart, peak = np.abs(pair.model - pair.recorded).max(axis=0), np.abs(pair.recorded).max(axis=0)
         ratio, drift = rrmse(pair.recorded, pair.model), drift_rate(pair.model - pair.recorded, step)
+        still = at_rest(pair.recorded, place=pair.name == "platen_displacement")
         for k, label in enumerate(pair.columns):
-            moved = peak[k] > _SILENT * peak.max()
-            numbers = peak[k], apart[k], ratio[k] if moved else math.nan, drift[k]
+            numbers = peak[k], apart[k], math.nan if still[k] else ratio[k], drift[k]
             found.append(Compared(f"{pair.name} {label}", channel_unit(f"{pair.name}[{label}]"), *map(float, numbers)))
     return found

@@ -6,11 +6,15 @@ __all__ = ["Client"]
 
 
 class Client:
-    """A browser: its number, the name of its user, and how it is informed that an order was refused."""
+    """A browser: its number, the name of its user, and how it is informed of a refused order and of a lost connection.
 
-    def __init__(self, number: str, refuse: Callable[[str], None]) -> None:
+    Attribute `key`: what its page calls itself in all its connections; empty until the page states it.
+    """
+
+    def __init__(self, number: str, refuse: Callable[[str], None], notify: Callable[[str], None]) -> None:
         """Join as a watcher."""
-        self.number, self.name, self.refuse = number, f"guest {number}", refuse
+        self.number, self.name, self.refuse, self.notify = number, f"guest {number}", refuse, notify
+        self.key = ""
 
     def explain(self, error: BaseException) -> None:
         """Refuse with the reason that an error states; an error of no message is one of the page."""

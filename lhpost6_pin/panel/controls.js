@@ -202,13 +202,13 @@ export function sendName() {
   try { localStorage.setItem("panel-name", name); } catch { /* a browser that keeps nothing */ }
   if (name) send({ do: "name", name });
 }
-export function showRecording({ recording, recordings }) {
+export function showRecording({ recording, recordings, writing }) {
   part("recording").className = recording ? "note on" : "note";
   const files = `${recordings.length} file${recordings.length === 1 ? "" : "s"}`;
   write(part("recording"), recording ? `● ${recording.name}, ${recording.seconds.toFixed(1)} s` : files);
   write(part("record"), recording ? "Stop recording" : "Record");
   let k = 1; // the first free name is proposed
-  while (recordings.some((path) => path.split("/").includes(`test-${k}`) || path.includes(`test-${k}.`))) k++;
+  while (writing.includes(`test-${k}`) || recordings.some((path) => path.split("/").includes(`test-${k}`) || path.includes(`test-${k}.`))) k++;
   part("record-name").placeholder = `test-${k}`;
   if (recording) show(part("record-name"), "");
 }

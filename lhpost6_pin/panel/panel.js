@@ -6,8 +6,17 @@ import { addLog, buildAxes, clearLog, showBars, showFaults, showInterlocks, show
 
 const AGAIN = 1000, SILENT = 4000, READ = 120; // [ms] until the next attempt; without a message until the connection counts as lost; between numbers
 const LOST = "Connection lost, trying again. The controls are disabled; the table is left to the server's interlocks.";
+const KEY = ownKey();
 let socket = null, hello = null, known = "", heard = 0, read = 0;
 
+function ownKey() { // by which the server recognises this page after a lost connection
+  const made = [...crypto.getRandomValues(new Uint8Array(16))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+  try {
+    const kept = sessionStorage.getItem("panel-key") ?? made;
+    sessionStorage.setItem("panel-key", kept);
+    return kept;
+  } catch { return made; /* a browser that keeps nothing */ }
+}
 function send(order) { // a new order takes the answer to the last one off the page
   if (socket?.readyState !== WebSocket.OPEN) return;
   dismiss();
@@ -21,6 +30,10 @@ function complain(what) {
 function dismiss() {
   part("refusal-box").hidden = true;
   part("refusal").textContent = "";
+}
+function notify(what) { // stays until it is dismissed
+  write(part("notice"), what);
+  part("notice-box").hidden = false;
 }
 
 // ------------------------------------------------------------------------------------------------ messages
@@ -38,6 +51,7 @@ function greet(found) {
   }
   const view = new URL(found.view, location.href).href;
   if (part("view").src !== view) part("view").src = view;
+  socket.send(JSON.stringify({ do: "join", key: KEY }));
   if (part("name").value) sendName();
 }
 function steps({ pressure, platen }) {
@@ -56,10 +70,9 @@ function progress({ name, state, time, duration }) {
   write(part("program-state"), !busy && waits() ? "checking" : state);
   write(part("run"), !busy && waits() ? "Checking" : "Run");
 }
-function link({ link: { word, late, samples, holds }, server }) {
-  const share = `${(100 * late).toFixed(2)} % late`;
-  write(part("link"), word === "on" ? `✓ ok, ${share}` : word === "lost" ? `! lost, ${share}` : samples ? "closed" : "not connected yet");
-  part("link").title = `Server ${server}: ${samples} samples, ${(100 * late).toFixed(3)} % of them late, ${holds} safe hold${holds === 1 ? "" : "s"}`;
+function link({ link: { text, title } }) {
+  write(part("link"), text);
+  part("link").title = title;
 }
 function tell(state) {
   write(part("machine"), state.machine);
@@ -77,7 +90,7 @@ function tell(state) {
   showInterlocks(state, send, complain);
   if (hello.trainer) showFaults(state.faults, send);
   showRecording(state);
-  showRecordings(state.recordings);
+  showRecordings(state.recordings, state.writing);
   addLog(state.log);
   addSamples(state.scope);
   if (performance.now() - read > READ) {
@@ -93,6 +106,7 @@ function take(message) {
   heard = performance.now();
   if (message.kind === "hello") greet(message);
   else if (message.kind === "refusal") complain(message.what);
+  else if (message.kind === "notice") notify(message.what);
   else if (message.kind === "state" && hello) tell(message);
 }
 
@@ -132,6 +146,7 @@ setInterval(() => { // a server that fell silent, or a computer that slept
 }, AGAIN);
 
 part("refusal-close").addEventListener("click", dismiss);
+part("notice-close").addEventListener("click", () => { part("notice-box").hidden = true; });
 try { part("name").value = localStorage.getItem("panel-name") ?? ""; } catch { /* a browser that keeps nothing */ }
 connectControls(send, complain);
 lock("no connection to the panel's server");

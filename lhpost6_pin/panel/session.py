@@ -17,8 +17,11 @@ from .choice import Choice
 from .client import Client
 from .engine import Status
 from .journal import Journal
+from .link_state import link_state
+from .lost_operators import LostOperators
 from .orders import Orders, pressed
 from .processes import ControlProcess, PlantProcess
+from .program_end import ProgramEnd
 from .recording import Recording, record_of_rows
 from .ring import RingReader
 from .timekeeping import Timekeeping
@@ -44,8 +47,8 @@ class Session:
     """A panel: its clients, the controller's process, and the plant's, unless a server elsewhere is driven.
 
     Attributes: clients by number; operator, one of them or None; status of the controller, None while the pressure is
-    off; journal; recording and recordings, the files of those that ended; choice of a program; news of the link: off,
-    on or lost; time, how well the plant's clock is kept.
+    off; journal; recording, writing and recordings, the one that goes on, names of those whose files are being written,
+    and files; choice of a program; news of the link: off, on or lost; time, how well the plant's clock is kept.
     """
 
     def __init__(
@@ -69,7 +72,9 @@ class Session:
         self.status: Status | None = None
         self.journal = Journal(folder / "journal.jsonl")
         self.recording: Recording | None = None
+        self.writing: list[str] = []
         self.recordings: list[str] = []
+        self._end_of_program, self._lost = ProgramEnd(), LostOperators()
         self.link, self.time = "off", Timekeeping(self.layout, options.pace)
         self.server = "of its own" if server is None else f"{server[0]}:{server[1]}"
         self._orders = Orders(setup.machine, self._numbers, setup.ring.parent)
@@ -107,10 +112,20 @@ class Session:
             return
         self.operator = None
         self.choice.cancel()
-        running = self.status is not None and self.status.state in ("running", "holding")
+        status = self.status
+        running = status.program if status is not None and status.state in ("running", "holding") else None
         self.journal.note(client.name, "left the panel" + (" in mid-run: the program is stopped" if running else ""))
+        self._lost.add(client.key, self.journal.entries[-1]["time"], running)
+        for other in self.clients.values():  # the same page may have come back before its loss was noticed
+            self._notify_lost(other)
         if self.status is not None:  # also of a program that has been run since
             self._send(client, {"do": "stop", "what": ""})
+
+    def _notify_lost(self, client: Client) -> None:
+        """Notify the page of an operator who lost the connection, and with it the controls."""
+        stated = self._lost.take(client.key, self.operator.name if self.operator else None)
+        if stated is not None:
+            client.notify(stated)
 
     def role(self, client: Client) -> str:
         """Role of a client."""
@@ -128,6 +143,10 @@ class Session:
         do = str(message["do"])
         if do == "name":
             client.name = re.sub(r"\s+", " ", str(message["name"])).strip()[:40] or client.name
+            return
+        if do == "join":
+            client.key = str(message["key"])[:64]
+            self._notify_lost(client)
             return
         if do == "take":
             if self.operator not in (None, client):
@@ -189,10 +208,12 @@ class Session:
         elif self.recording is not None:
             done, self.recording = self.recording, None
             self.journal.note(client.name, f"ends the recording {done.name}, {done.seconds:.1f} s")
+            self.writing.append(done.name)
             saved = self._work.submit(self._save, done)
-            saved.add_done_callback(lambda future: self._saved(client, future))
+            saved.add_done_callback(lambda future: self._saved(client, done.name, future))
 
-    def _saved(self, client: Client, done: "Future[str]") -> None:
+    def _saved(self, client: Client, name: str, done: "Future[str]") -> None:
+        self.writing.remove(name)
         error = done.exception()
         if error is not None:
             client.refuse(str(error))
@@ -212,10 +233,10 @@ class Session:
         return str(path)
 
     def _free_name(self, name: str) -> str:
-        """A name for a recording that no file has."""
+        """A name for a recording that no file has, nor one that is being written."""
         wanted = re.sub(r"[^\w.-]+", "_", name).strip("._") or "test"
         number, found = 1, wanted if name else "test-1"
-        while (self._folder / f"{found}.nc").exists():
+        while found in self.writing or (self._folder / f"{found}.nc").exists():
             number += 1
             found = f"{wanted}-{number}"
         return found
@@ -232,13 +253,21 @@ class Session:
         rows = self._ring.read()
         if len(rows):
             self.time.add(rows)
+            self._end_of_program.pass_time(float(self.layout.of(rows, "program_time").max()))
+        if (ended := self._end_of_program.take()) is not None:
+            self.journal.note("program", ended)
         if self.recording is not None:
             self.recording.add(rows)
         return rows
 
+    def link_state(self) -> dict[str, Any]:
+        """State of the link, as the page shows it."""
+        return link_state(self.link, self.time, self.server, self._own is not None, self._numbers)
+
     def _end(self) -> None:
         """Without a session there is no state, and no program."""
         self.status = self._orders.program = None
+        self._end_of_program.show(None)
         self.choice.drop()
 
     def _handle(self, kind: str, content: Any) -> None:
@@ -246,9 +275,12 @@ class Session:
             if content.trip and (self.status is None or not self.status.trip):
                 self.journal.note("interlock", f"trip: {content.trip}")
             self.status, self.link = content, "on"
+            self._end_of_program.show(content)
         elif kind == "done":
             if content["what"]:
                 self.journal.note(content["who"], content["what"])
+            if content["do"] == "stop":
+                self._end_of_program.stop(content["who"])
             self.choice.done(content, self.status)
         elif kind == "refusal":
             order, why = content

@@ -109,12 +109,13 @@ export function showBars(bars) {
 }
 
 // ------------------------------------------------------------------------------------------------ recordings, faults, log
-export function showRecordings(recordings) {
-  const list = part("recordings"), known = recordings.join("\n") || "none";
+export function showRecordings(recordings, writing) {
+  const list = part("recordings"), known = [...recordings, "", ...writing].join("\n");
   if (list.dataset.known === known) return;
   list.dataset.known = known;
   const none = make("li", { className: "none", textContent: "No recording yet. Every other command reads these files." });
   const items = [...recordings].reverse().map((path) => make("li", { title: path }, make("bdi", { textContent: path })));
+  items.unshift(...writing.map((name) => make("li", { className: "none", textContent: `writing ${name} …` })));
   list.replaceChildren(...(items.length ? items : [none]));
 }
 export function showFaults(faults, send) {

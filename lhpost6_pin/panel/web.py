@@ -7,6 +7,7 @@ import secrets
 import signal
 import socket
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from .client import Client
 from .interlocks import INTERLOCKS
 from .programs import WAVES
 from .session import Session
+from .worker import panel_numbers
 
 __all__ = ["PanelServer"]
 
@@ -83,7 +85,8 @@ class PanelServer:
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, stop.set)
         self._loop = loop
-        application = Application(cookie_secret=secrets.token_hex(16))
+        silence = panel_numbers().number("page.silence")  # after which a page that was cut off has left
+        application = Application(cookie_secret=secrets.token_hex(16), websocket_ping_interval=silence)
         handlers = [*_handlers(self), *(_guarded(self, rule) for rule in self._shared.handlers("/view/"))]
         application.add_handlers(HOSTS if self._local else ".*", handlers)
         server = HTTPServer(application)
@@ -117,10 +120,10 @@ class PanelServer:
         number = f"b{self._number}"
         loop = self._loop
 
-        def refuse(why: str) -> None:
-            loop.call_soon_threadsafe(_write, browser, {"kind": "refusal", "what": why})
+        def send(kind: str, what: str) -> None:
+            loop.call_soon_threadsafe(_write, browser, {"kind": kind, "what": what})
 
-        client = Client(number, refuse)
+        client = Client(number, partial(send, "refusal"), partial(send, "notice"))
         self._browsers[number], self._sent[number] = browser, 0
         self._session.join(client)
         _write(browser, self._hello())
@@ -194,13 +197,7 @@ class PanelServer:
             "time": self._last[0] / SAMPLE_RATE,
             "operator": operator.name if operator else None,
             "watchers": len(session.clients) - (operator is not None),
-            "link": {
-                "ok": session.link == "on",
-                "word": session.link,
-                "late": session.time.share,
-                "samples": session.time.answered,
-                "holds": session.time.holds,
-            },
+            "link": session.link_state(),
             "pressure": status.pressure if status else "off",
             "platen": status.platen if status else "unknown",
             "trip": (status and status.trip) or None,
@@ -210,6 +207,7 @@ class PanelServer:
             "recording": {"name": session.recording.name, "seconds": session.recording.seconds}
             if session.recording
             else None,
+            "writing": list(session.writing),
             "recordings": session.recordings,
             "faults": [_fault(name, on) for name, on in session.faults.items()] if self._trainer else [],
         }

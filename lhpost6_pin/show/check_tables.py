@@ -12,7 +12,7 @@ from .report.page import Table
 from .tables import print_sensor_findings
 from .terminal import print_blocks
 
-__all__ = ["check_entries", "print_check", "print_tests", "campaign_entries"]
+__all__ = ["check_entries", "print_check", "print_contradictions", "print_tests", "campaign_entries"]
 
 VERDICTS = {"yes": "yes", "ratio": "partly", "no": "no"}
 
@@ -48,9 +48,14 @@ def print_check(found: CampaignCheck) -> None:
     print_blocks(Table(title, header, rows) if rows else "no channel shows noise", *found.warnings)
     if found.findings is not None:
         print_sensor_findings(found.findings)
-        print_blocks(*(f"warning: {words} in the channel map, and import again" for words in found.contradictions))
+        print_contradictions(found.contradictions)
     told = [(one.quantity, VERDICTS[one.verdict], one.why) for one in found.observable]
     print_blocks(Table("What these sensors can tell", ("quantity", "", "why"), told))
+
+
+def print_contradictions(found: Sequence[str]) -> None:
+    """Print a warning for every contradiction of redundant sensors, as `check` and `import` do."""
+    print_blocks(*(f"warning: {words} in the channel map, and import again" for words in found))
 
 
 def campaign_entries(tests: Sequence[RecordSummary]) -> dict[str, Any]:

@@ -163,7 +163,8 @@ def sine_entries(found: "SineTest") -> Entries:
 
     results = {"alone": found.before, "with_cancellers": found.after}
     both = {when: {**_picked(one, *names), "clipped": one.run.clipped} for when, one in results.items()}
-    return _picked(found, "axis", "amplitude", "frequency") | both
+    highest = {"cancelled_up_to_hz": found.cancelled * found.frequency}
+    return _picked(found, "axis", "amplitude", "frequency") | highest | both
 
 
 def agreement_entries(found: "Decomposed", agreement: "WrenchAgreement") -> Entries:
@@ -181,7 +182,14 @@ def agreement_entries(found: "Decomposed", agreement: "WrenchAgreement") -> Entr
     axes = {}
     for k in found.plant.axes:
         forces = {
-            name: None if one is None else {"rrmse": one.rrmse[k], "rrmse_mean_off": one.rrmse_varying[k]}
+            name: None
+            if one is None
+            else {
+                "rrmse": one.rrmse[k],
+                "rrmse_mean_off": one.rrmse_varying[k],
+                "rms_difference": one.difference[k],
+                "at_rest": bool(one.at_rest[k]),
+            }
             for name, one in matches.items()
         }
         own = {name: values[k] for name, values in residual.items()}

@@ -79,7 +79,8 @@ def rehearse(
     run = with_pressure_trouble(_usable(run))
     motion = (target.displacement, target.velocity, target.acceleration)
     reference = PlatenMotion(*(x[::record_every][: len(run.time)] for x in motion))
-    record = record_of_run(run, {**test_facts(settings, target), **attrs}, reference)
+    facts = {**test_facts(settings, target), **({"thinned_from_hz": float(SAMPLE_RATE)} if record_every > 1 else {})}
+    record = record_of_run(run, {**facts, **attrs}, reference)
     if target.spectrum is not None:
         record["required_spectrum"] = required_channel(target.spectrum)
     if isinstance(settings, ControllerSettings) and isinstance(loop, ClosedLoop) and (drive is not None or inverse):

@@ -18,7 +18,7 @@ import numpy as np
 from ..control import Controller, ControllerSettings, controlled
 from ..control.filters import sampled_response
 from ..control.loop import CANCELLER
-from ..core.arrays import Array
+from ..core.arrays import Array, Complex
 from ..core.errors import SimulationError
 from ..core.names import AXES, SAMPLE_RATE
 from ..core.progress import Progress
@@ -72,6 +72,8 @@ class SineTest(Shown):
     measured: slice  # samples over which amplitude, phase and distortion are taken
     before: SineResult
     after: SineResult
+    cancelled: int  # multiples of the frequency, itself included, that have a canceller
+    wanted: int  # multiples that were to have one
 
 
 def axis_row(plant: Plant, axis: str) -> int:
@@ -87,6 +89,11 @@ def with_cancellers(
 ) -> Controller:
     """Controller with cancellers of the first `count` multiples of a frequency [Hz] on one axis; constant in [s].
 
+    There is none from the first multiple on at which the size of T rises or falls too fast with frequency
+    (`canceller.slope` of the tuning file): about a pair of zeros and poles, as in pitch at 31 and 36 Hz, where x moves
+    with it, the phase of the linear model is off by more than 90 degrees, with which a canceller grows. The fundamental
+    always has one.
+
     Raises SimulationError for an axis that is not free, and in other modes than acceleration: there the generator
     differentiates the output of the cancellers, and the loop through them becomes unstable above their harmonics.
     """
@@ -98,17 +105,27 @@ def with_cancellers(
         )
     a = axis_row(controller.plant, axis)
     multiples = np.asarray(frequency * np.arange(1, count + 1), np.float64)
-    row = controller.axis[a]
-    generator = row["generator_a"], row["generator_b"], row["generator_c"], row["generator_d"]
-    reference = sampled_response(generator, multiples, float(SAMPLE_RATE))[:, 0, 0]
-    followed = expected_response(make_loop_model(controller, multiples), controller)[:, a, a]
-    response = (2j * np.pi * multiples) ** 2 * followed * reference
+    step = tuning_numbers().number("canceller.step")
+    response, above, below = _drive_response(controller, a, np.outer([1.0, 1.0 + step, 1.0 - step], multiples))
+    slope = np.abs(np.log(np.abs(above / below))) / np.log((1.0 + step) / (1.0 - step))
+    steep = slope > tuning_numbers().number("canceller.slope")
+    count = max(1, int(np.argmax(steep)) if steep.any() else count)
+    multiples, response = multiples[:count], response[:count]
     table = np.zeros(count, CANCELLER)
     table["axis"] = a
     table["turn"] = 2.0 * np.pi * multiples / SAMPLE_RATE
     table["cosine"], table["sine"] = np.cos(np.angle(response)), np.sin(np.angle(response))
     table["rate"] = 2.0 / (time_constant * SAMPLE_RATE) / np.abs(response)
     return controller._replace(canceller=table)
+
+
+def _drive_response(controller: Controller, a: int, frequency: Array) -> Complex:
+    """Response of the linear model from drive to acceleration of free axis a, at frequencies of any shape [Hz]."""
+    row, every = controller.axis[a], frequency.ravel()
+    generator = row["generator_a"], row["generator_b"], row["generator_c"], row["generator_d"]
+    reference = sampled_response(generator, every, float(SAMPLE_RATE))[:, 0, 0]
+    followed = expected_response(make_loop_model(controller, every), controller)[:, a, a]
+    return np.asarray(((2j * np.pi * every) ** 2 * followed * reference).reshape(frequency.shape))
 
 
 def sine_target(axis: str, amplitude: float, frequency: float) -> tuple[Target, Array, slice]:
@@ -180,7 +197,8 @@ def sine_test(
         found.append(_evaluate(run, target, AXES.index(axis), frequency, measured, counted))
         if progress is not None:
             progress((n + 1) / 2)
-    return SineTest(settings, target, axis, amplitude, frequency, measured, *found)
+    cancelled, (before, after) = len(adaptive.canceller), found
+    return SineTest(settings, target, axis, amplitude, frequency, measured, before, after, cancelled, count)
 
 
 def _evaluate(run: Run, target: Target, k: int, frequency: float, measured: slice, count: int) -> SineResult:

@@ -16,8 +16,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
+from ...core.arrays import Array, Mask
 from ...data.alignment import phase_delay
+from ...data.at_rest import at_rest
 from ...data.channels import LAYOUT
 from ...data.sensors import SensorSet, add_noise
 from ...data.signals import Band, correlation, differentiate, peak_ratio, rrmse
@@ -37,8 +38,14 @@ Explanation = Literal["none needed", "noise", "sensors", "parameters", "nothing"
 
 
 class Match(NamedTuple):
-    """Modelled against measured forces, per axis (6,); the measured ones are the reference."""
+    """Modelled against measured forces, per axis (6,); the measured ones are the reference.
 
+    An axis without any measured force but rounding is at rest: its ratios and correlation are NaN, and so is that of
+    means removed where nothing but rounding varies.
+    """
+
+    at_rest: Mask
+    difference: Array  # rms of modelled less measured [N, N m]
     rrmse: Array
     rrmse_varying: Array  # means removed
     peak_ratio: Array
@@ -141,8 +148,12 @@ def _match(found: Decomposed, measured: Array, modelled: Array, required: float)
     moving = Band(band.high / 16, band.high, band.order)  # above the window's lobe
     known = correlation(moving.apply(measured, dt), moving.apply(modelled, dt)) >= required
     late, error = (np.where(known, x, np.nan) for x in phase_delay(measured, modelled, dt, moving))
-    ratio, correlated = peak_ratio(measured, modelled), correlation(measured, modelled)
-    return Match(rrmse(measured, modelled), varying, ratio, correlated, late, error)
+    largest = float(np.abs(found.forces.measured).max())
+    still = at_rest(measured, largest)
+    varying = np.where(at_rest(measured - measured.mean(axis=0), largest), np.nan, varying)
+    ratios = rrmse(measured, modelled), varying, peak_ratio(measured, modelled), correlation(measured, modelled)
+    difference = np.sqrt(np.mean((modelled - measured) ** 2, axis=0))
+    return Match(still, difference, *(np.where(still, np.nan, x) for x in (*ratios, late, error)))
 
 
 def _level(x: Array) -> Level:

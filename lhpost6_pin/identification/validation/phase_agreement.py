@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.arrays import Array, Mask
+from ...data.at_rest import at_rest
 from ...data.channels import LAYOUT, channel_unit
 from ...data.signals import align, correlation, delay_within, drift_rate, peak_ratio, rrmse
 from .prepare_tests import Numbers
@@ -26,6 +27,9 @@ _UNITS = {
     **{quantity: LAYOUT[f"platen_{quantity}"].units for quantity in MOTIONS},
     **dict.fromkeys(("wrench", "struts", "dissipative"), "N, N m"),
 }
+_FIRST = {"displacement": 0, "velocity": 1}
+"""Of what other quantities take: which axes are at rest, and the delay."""
+
 _PRELOADED = ("wrench", "struts", "dissipative", "actuator_force", "chamber_pressure_a", "chamber_pressure_b")
 
 
@@ -82,9 +86,14 @@ def agree(pairs: Sequence[ComparedQuantity], dt: float, numbers: Numbers) -> tup
     """
     shared: dict[str, float] = {}
     found: list[ColumnAgreement] = []
-    for pair in sorted(pairs, key=lambda p: p.quantity != "velocity"):
+    still: set[str] = set()  # axes of the platen
+    for pair in sorted(pairs, key=lambda p: _FIRST.get(p.quantity, len(_FIRST))):
         part = numbers.inside(len(pair.measured), dt)
         moves = _moving(pair, pair.measured[part], numbers)
+        if pair.quantity == "displacement":
+            still = {pair.columns[k] for k in np.flatnonzero(at_rest(pair.measured[part], place=True))}
+        if pair.quantity in MOTIONS:
+            moves &= [column not in still for column in pair.columns]
         for k, column in enumerate(pair.columns):
             late = float("nan")
             if moves[k]:
@@ -106,6 +115,7 @@ def _moving(pair: ComparedQuantity, measured: Array, numbers: Numbers) -> Mask:
     weight = [per.get(unit_of(pair.quantity, column).split("/")[0], 1.0) for column in pair.columns]
     comparable = size * weight
     enough = (comparable >= numbers.number("hardly_moving.share") * comparable.max(initial=0.0)) & (comparable > 0.0)
+    enough &= ~at_rest(measured - measured.mean(axis=0), float(np.abs(measured).max(initial=0.0)))
     return np.asarray(enough & (size >= numbers.number("hardly_moving.noise") * pair.sensor_noise))
 
 

@@ -18,7 +18,8 @@ __all__ = ["match_tables", "residual_tables", "write_decompose_report"]
 EXACT = 1e-3  # fraction of the measured force below which the residual of a noise-free record counts as small
 MATCH = (
     "RRMSE = √(Σ error² ∕ Σ measured²); mean removed: from both. Delay: of the modelled behind the measured force "
-    "(negative: ahead of it), given where their correlation is high enough to determine it."
+    "(negative: ahead of it), given where their correlation is high enough to determine it. At rest: an axis whose "
+    "measured force is rounding beside the largest; the difference is given in its unit."
 )
 EXPLANATIONS: dict[Explanation, tuple[str, str]] = {  # sufficient explanation, and the residual by it
     "none needed": ("–", ""),
@@ -99,7 +100,7 @@ def _headlines(found: Decomposed, agreement: WrenchAgreement) -> list[Headline]:
     moved = [AXES.index(a) for a in moved_axes(found)] or list(found.plant.axes)
     tiles = [] if agreement.interface is None else interface_headlines(agreement.interface)
     for match, what in ((agreement.actuators, "total actuator force"), (agreement.dissipative, "dissipative force")):
-        worst = max(moved, key=lambda k: float(match.rrmse_varying[k]))
+        worst = max(moved, key=lambda k: float(np.nan_to_num(match.rrmse_varying[k])))
         note = f"{AXES[worst]}; {percent(float(match.rrmse[worst]))} including the mean"
         if len(moved) < len(found.plant.axes):
             note += f"; of the axes that move ({', '.join(AXES[k] for k in moved)}), not those almost at rest"
@@ -179,6 +180,13 @@ def match_tables(found: Decomposed, agreement: WrenchAgreement) -> list[Block]:
 
 
 def _match_row(match: Match, k: int) -> tuple[str, ...]:
+    if match.at_rest[k]:
+        return (
+            AXES[k],
+            "at rest",
+            f"differs by {shown_as(float(match.difference[k]), force_scale(AXES[k]))} rms",
+            *"–––",
+        )
     late = f"{1e3 * match.delay[k]:.3f} ± {1e3 * match.delay_error[k]:.3f} ms" if np.isfinite(match.delay[k]) else "–"
     shares = percent(float(match.rrmse[k])), percent(float(match.rrmse_varying[k]))
     return AXES[k], *shares, number(float(match.peak_ratio[k])), f"{match.correlation[k]:.4f}", late.replace("-", "−")

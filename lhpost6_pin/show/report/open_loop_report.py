@@ -86,7 +86,7 @@ def comparison_table(compared: Sequence[Compared]) -> Table:
     rows = [
         (
             *(c.channel, f"{c.peak_recorded:.4g} {c.unit}", f"{c.largest_difference:.3g} {c.unit}"),
-            *(percent(c.rrmse), f"{c.drift:.3g} {c.unit}/s"),
+            *("at rest" if math.isnan(c.rrmse) else percent(c.rrmse), f"{c.drift:.3g} {c.unit}/s"),
         )
         for c in compared
     ]

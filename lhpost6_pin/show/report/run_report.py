@@ -183,6 +183,8 @@ def _gaps(record: xr.Dataset) -> list[str]:
 def _purpose(record: xr.Dataset, found: Sequence[Tracking]) -> str:
     _, step = sampling(record)
     length = f"{number(record.sizes['time'] * step)} s at {1.0 / step:.6g} samples a second"
+    if (full := record.attrs.get("thinned_from_hz")) is not None:
+        length += f" (thinned from {float(full):.6g} without a filter: peaks and errors are of the samples kept)"
     if "reference_displacement" not in record:
         return f"{length}; the record has no target."
     commanded = commanded_axes(record)

@@ -88,6 +88,11 @@ def sine_verdict(test: SineTest, loop: Mapping[str, Any]) -> tuple[str, Level]:
         f"{np.degrees(PHASE):g}°.",
         change,
     ]
+    if test.cancelled < test.wanted:
+        words.append(
+            f"Harmonics above {number(test.cancelled * test.frequency)} Hz have no canceller: there the response of "
+            "the table changes too fast with frequency for one to be stable."
+        )
     reached = amplitude and phase and halved and not unsteady
     level: Level = "bad" if unstable or much else "good" if reached else "attention"
     if unsteady:

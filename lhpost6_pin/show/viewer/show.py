@@ -12,6 +12,7 @@ from .animation import draw_animation, leg_forces
 from .arrows import largest_force
 from .frames import AS_IT_IS, Frames, Look, record_frames, record_title
 from .histories import packed_histories, record_histories
+from .overlay import compare_overlaid
 from .scene import ROOT, draw_arrows, draw_machine, draw_motion, draw_names, names_layer
 from .viewer_page import Caption, Picture, render_page
 from .window import LoopbackWindow, Recorder, Window
@@ -29,7 +30,7 @@ def show_record(
     frames = record_frames(machine, record, others, look)
     recorder = Recorder()
     _draw(recorder, machine, frames)
-    return Picture(render_page(_caption(machine, record, frames), recorder.commands))
+    return Picture(render_page(_caption(machine, record, others, frames), recorder.commands))
 
 
 def live_animation(
@@ -40,7 +41,7 @@ def live_animation(
     Raises RecordError or ParameterError as `record_frames`.
     """
     frames = record_frames(machine, record, others, look)
-    window = LoopbackWindow(render_page(_caption(machine, record, frames), live=True))
+    window = LoopbackWindow(render_page(_caption(machine, record, others, frames), live=True))
     _draw(window, machine, frames)
     return window
 
@@ -62,7 +63,7 @@ def _draw(window: Window, machine: Machine, frames: Frames) -> None:
     draw_animation(window, machine, bodies, frames)
 
 
-def _caption(machine: Machine, record: xr.Dataset, frames: Frames) -> Caption:
+def _caption(machine: Machine, record: xr.Dataset, others: Sequence[xr.Dataset], frames: Frames) -> Caption:
     """Title, note, legend and layers of a record's page."""
     look, seconds = frames.look, (len(frames.time) - 1) / frames.look.rate
     kind = str(record.attrs.get("kind", "record"))
@@ -71,6 +72,7 @@ def _caption(machine: Machine, record: xr.Dataset, frames: Frames) -> Caption:
     if carried != "none" and machine.specimen is None:
         note += f"; specimen {carried} not drawn: give --specimen"
     note += "".join(f"; {sentence}" for sentence in changes_summary(record.attrs, 2))
+    note += "".join(f"; {sentence}" for sentence in compare_overlaid(record, others, frame=1.0 / look.rate).sentences)
     legend = machine_legend(machine) | {"path of C": drawing_colour("trace")}
     legend |= {f"{g.label} (outline)": drawing_colour(g.name) for g in frames.ghosts}
     layers = {"names": names_layer(), "path of C": [f"meshcat/{ROOT}/trace"]}

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..control.controller import Controller, make_controller
-from ..control.loop import control_step
+from ..control.loop import step_packed
 from ..control.settings import ControllerSettings
 from ..core.arrays import Array
 from ..core.errors import ControllerError
@@ -64,7 +64,7 @@ class Engine:
     ) -> None:
         """Prepare the controller; it begins at low pressure."""
         self._controller: Controller = make_controller(plant, rest, settings)
-        self._tables = self._controller.tables
+        self._packed = plant.tables.packed, self._controller.tables.packed
         self._interlocks = Interlocks(self._controller, rest, numbers)
         self._rows, self._parked = rows, plant.machine.platen.parked
         limits = plant.machine.limits
@@ -80,8 +80,9 @@ class Engine:
         self._command = rest.spool.copy()
         self._block, self._drives, self._first = Moved(*np.zeros((3, 0, 6))), np.zeros((0, 6)), 0
         self._last = 0
-        self._now = Measured(np.zeros(6), np.zeros(6), np.zeros(6), rest.force)
-        self.row = np.full(rows.width, np.nan)
+        self._now = Measured.of(np.concatenate([np.zeros(18), rest.force]))
+        self._row = np.full(rows.width, np.nan)
+        self._answered: tuple[Reading, Moved | None] | None = None  # of which the row is not filled yet
 
     @property
     def commanding(self) -> bool:
@@ -219,7 +220,7 @@ class Engine:
 
     # ------------------------------------------------------------------------------------- samples
     def answer(self, reading: Reading) -> Array | None:
-        """Command (n_actuators,) of the sample that has been read; None: it is not commanded. `row` is filled."""
+        """Command (n_actuators,) of the sample that has been read; None: it is not commanded."""
         sample = reading.sample
         self._last, self._state, now = sample, reading.state, measured_motion(reading)
         self._now = now
@@ -231,11 +232,19 @@ class Engine:
             wanted = None
         command = None
         if wanted is not None:
-            command, tables = np.empty(len(self._command)), (self._controller.plant.tables, self._tables)
-            control_step(sample - self._first, self._drives, reading.sensors, *tables, self._memory, command)
+            command = np.empty(len(self._command))
+            step_packed(sample - self._first, self._drives, *reading.sensors, *self._packed, self._memory, command)
             self._command = command
-        self._fill(reading, now, wanted)
+        self._answered = reading, wanted
         return command
+
+    @property
+    def row(self) -> Array:
+        """Row of the sample that was answered last (`rows`), filled when it is first read: the command goes first."""
+        if self._answered is not None:
+            self._fill(*self._answered)
+            self._answered = None
+        return self._row
 
     @property
     def status(self) -> Status:
@@ -257,8 +266,8 @@ class Engine:
             self._number,
         )
 
-    def _fill(self, reading: Reading, now: Measured, wanted: Moved | None) -> None:
-        row, places = self.row, self._rows.places
+    def _fill(self, reading: Reading, wanted: Moved | None) -> None:
+        row, places, now = self._row, self._rows.places, self._now
         row[:4] = reading.sample, int(reading.state), self._drive.state(self._last).time, reading.stamp / SECOND
         for name, measured, reference in zip(QUANTITIES, now[:3], wanted or now[:3], strict=True):
             row[places[f"platen_{name}"]], row[places[f"reference_{name}"]] = measured, reference

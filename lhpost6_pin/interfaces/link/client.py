@@ -44,8 +44,13 @@ class Reading(NamedTuple):
     sensors: Feedback
     acknowledged: int  # sequence of the newest command that acted
     stamp: int  # the server's clock [ns]
-    motion: BaseMotion  # of the interface, at C in axes of the platen
+    interface: Array  # (18,) motion of the platen at C, position and Euler angles first (`coupled.motion_numbers`)
     pressures: PressureReading | None = None  # where the client asked for them and the server knows them
+
+    @property
+    def motion(self) -> BaseMotion:
+        """Motion of the interface, at C in axes of the platen."""
+        return motion_of_numbers(self.interface)
 
 
 class LinkClient:
@@ -99,6 +104,7 @@ class LinkClient:
         self.machine, self.actuators = welcome.machine, welcome.actuators
         self.counts = np.array(welcome.valves, np.int64)
         self.valves = valve_names(self.actuators, self.counts)
+        self._actuator = np.repeat(np.arange(len(self.counts)), self.counts)  # of each valve
         self.reading = self._read(found[Kind.SENSORS])
 
     def __enter__(self) -> Self:
@@ -124,8 +130,11 @@ class LinkClient:
 
     def wait(self, seconds: float) -> list[Reading]:
         """All sensors that have come since the last look, once some have; none if none come within a time [s]."""
-        select.select([self._sock], [], [], seconds)
-        return self._arrived()
+        found = self._arrived()
+        if not found:
+            select.select([self._sock], [], [], seconds)
+            found = self._arrived()
+        return found
 
     def _arrived(self) -> list[Reading]:
         found = []
@@ -185,7 +194,7 @@ class LinkClient:
     def _command(self, command: Array, wrench: ArrayLike | None) -> Datagram:
         values = np.asarray(command, float)
         if values.shape == self.counts.shape:
-            values = np.repeat(values, self.counts)
+            values = values.take(self._actuator)
         elif values.shape != (len(self.valves),):
             raise LinkError(
                 f"a command of shape {values.shape}; {self.machine} has {len(self.actuators)} actuators and "
@@ -242,10 +251,10 @@ class LinkClient:
 
     def _get(self, timeout: float) -> Datagram | None:
         """A frame of this session, if a datagram comes within a time [s]."""
-        if not select.select([self._sock], [], [], timeout)[0]:
-            return None
         try:
             frame = decode(self._sock.recv(_LARGEST))
+        except BlockingIOError:
+            return self._get(0.0) if timeout > 0.0 and select.select([self._sock], [], [], timeout)[0] else None
         except ConnectionError:  # no server: no reason to retry at once
             time.sleep(timeout)
             return None
@@ -276,11 +285,11 @@ class LinkClient:
         assert frame.numbers is not None
         numbers, n, at = frame.numbers, len(self.actuators), 6 + 2 * len(self.actuators)
         sensors = Feedback(numbers[6 : 6 + n], numbers[:6], numbers[6 + n : at])
-        motion = motion_of_numbers(numbers[at : at + MOTION])
         pressures = None
         if frame.pressures:
             own = numbers[at + MOTION :]
             pressures = PressureReading(
                 own[:n], own[n : 2 * n], own[2 * n : 3 * n], own[3 * n : 3 * n + frame.struts], float(own[-1])
             )
-        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, motion, pressures)
+        interface = numbers[at : at + MOTION]
+        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, interface, pressures)

@@ -132,10 +132,11 @@ def _listen(sock: socket.socket, served: ServedPlant, timeout: float) -> bool:
 
 def answer_one(sock: socket.socket, timeout: float, answers: Callable[[bytes, Any], Iterable[bytes]]) -> bool:
     """Receive one datagram within a time [s] and send its sender the answers to it; False if there was none."""
-    if not select.select([sock], [], [], timeout)[0]:
-        return False
     try:
-        datagram, sender = sock.recvfrom(_LARGEST)
+        datagram, sender = sock.recvfrom(_LARGEST, socket.MSG_DONTWAIT)
+    except BlockingIOError:
+        arrives = timeout > 0.0 and bool(select.select([sock], [], [], timeout)[0])
+        return arrives and answer_one(sock, 0.0, answers)
     except OSError:  # some systems report here that an earlier answer could not be delivered
         return True
     for answer in answers(datagram, sender):

@@ -154,6 +154,7 @@ class _Controller:
             client.keep()  # a plant of the panel's own waits for commands until it knows that none come
             self._kept = self._reading.sample
         self._ring.write(engine.row)
+        engine.prepare()
 
     def _look(self, show: bool = True) -> None:
         """Take orders and, if it is to be, show the state."""

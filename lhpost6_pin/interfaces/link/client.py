@@ -128,9 +128,16 @@ class LinkClient:
         found = self._arrived()
         return found[-1] if found else None
 
-    def wait(self, seconds: float) -> list[Reading]:
-        """All sensors that have come since the last look, once some have; none if none come within a time [s]."""
+    def wait(self, seconds: float, poll: float = 0.0) -> list[Reading]:
+        """All sensors that have come since the last look, once some have; none if none come within a time [s].
+
+        poll: time [s] before, in which they are taken a wake-up (about 0.05 ms) sooner and the processor does not rest.
+        """
         found = self._arrived()
+        if not found and poll:
+            until = now() + round(poll * SECOND)
+            while not found and now() < until:
+                found = self._arrived()
         if not found:
             select.select([self._sock], [], [], seconds)
             found = self._arrived()

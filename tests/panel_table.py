@@ -33,9 +33,7 @@ class Table:
     def _read(self, datagram):
         frame, n = decode(datagram), self.n
         sensors = Feedback(frame.numbers[6 : 6 + n], frame.numbers[:6], frame.numbers[6 + n : 6 + 2 * n])
-        return Reading(
-            frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, frame.numbers[-MOTION:]
-        )
+        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, frame.numbers[-MOTION:])
 
     def do(self, do, program=None, **more):
         self.engine.order({"do": do, **more}, program)

@@ -35,7 +35,8 @@ from ..mechanics.workspace import unpack_workspace
 from .filters import NOTCHES
 
 __all__ = ["ACTUATOR", "AXIS", "CANCELLER", "FEEDBACK", "FORCE", "GENERATOR", "MEMORY_ROWS", "POSE", "ControlTables"]
-__all__ += ["Feedback", "control_packed", "control_sample", "control_step", "pack_control", "sense", "sense_packed", "step_packed"]
+__all__ += ["Feedback", "control_packed", "control_sample", "control_step", "pack_control", "sense", "sense_packed"]
+__all__ += ["step_packed"]
 
 AXIS = np.dtype(
     [

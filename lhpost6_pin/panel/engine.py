@@ -25,10 +25,10 @@ from .drive import Drive
 from .interlocks import INTERLOCKS, Interlocks, Measured, measured_motion
 from .moves import Moved
 from .programs import Program
-from .reference import BLOCK, Reference
+from .reference import Reference
 from .rows import PRESSURES, Rows
 
-__all__ = ["BLOCK", "Engine", "Status"]
+__all__ = ["Engine", "Status"]
 
 
 class Status(NamedTuple):

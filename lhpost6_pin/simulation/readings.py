@@ -36,7 +36,7 @@ def _put(x, out, at):
 
 @compiled_inline
 def _interface(tables, ws, frame, moved, out):
-    """Motion (18,) of C as `interface.base_motion` and `coupled.motion_numbers`; frame (8, 3), moved (2, 6): scratch."""
+    """Motion (18,) of C as `base_motion` and `motion_numbers` give it; frame (8, 3) and moved (2, 6) are scratch."""
     axes, rho = tables.axes, tables.body[0].rho_c
     platen_pose(ws.q, axes, tables.body, frame)
     moved[:] = 0.0

@@ -100,18 +100,8 @@ from ...core.arrays import Array
 from ...core.checksum import crc_of, with_crc
 from ...core.errors import LinkError, UnknownNameError
 
-__all__ = [
-    "COUNTS",
-    "MOTION",
-    "VERSION",
-    "VersionError",
-    "Datagram",
-    "Kind",
-    "LinkMode",
-    "PlantState",
-    "ShortDatagramError",
-    "Welcome",
-]
+__all__ = ["COUNTS", "MOTION", "VERSION", "Datagram", "Kind", "LinkMode", "PlantState", "ShortDatagramError"]
+__all__ += ["VersionError", "Welcome"]
 __all__ += ["decode", "encode", "find_mode", "is_newer", "refusal"]
 
 

@@ -8,15 +8,13 @@ drops out again and again still commands. In lock-step, where time stands still 
 through the ramp at once.
 
 Faults. Each is a plant of its own, made before a client comes. To go over to it (`RunningPlant.with_plant`) takes
-0.25 ms on an idle core, twice as much on a busy one, beside the sample's own 0.1 to 0.25 ms: the one sample of a switch
+0.25 ms on an idle core, twice as much on a busy one, beside the sample's own 0.1 ms: the one sample of a switch
 may be late in real time, usually by less than a sample, and is then counted as a missed deadline. Two faults at once
 would need a plant for each pair, so one at a time is on.
 """
 
 import logging
 from collections.abc import Hashable, Mapping
-
-import numpy as np
 
 from ...control.valves import per_actuator, valve_counts
 from ...core.arrays import Array

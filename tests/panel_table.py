@@ -7,7 +7,6 @@ from lhpost6_pin.control.plug import Feedback
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.interfaces.link import Datagram, Kind, LinkMode, Reading, ServedPlant, decode, encode
 from lhpost6_pin.interfaces.link.protocol import MOTION
-from lhpost6_pin.mechanics.coupled import motion_of_numbers
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium, parked_pose
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.panel.engine import Engine
@@ -34,8 +33,7 @@ class Table:
     def _read(self, datagram):
         frame, n = decode(datagram), self.n
         sensors = Feedback(frame.numbers[6 : 6 + n], frame.numbers[:6], frame.numbers[6 + n : 6 + 2 * n])
-        motion = motion_of_numbers(frame.numbers[-MOTION:])
-        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, motion)
+        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, frame.numbers[-MOTION:])
 
     def do(self, do, program=None, **more):
         self.engine.order({"do": do, **more}, program)

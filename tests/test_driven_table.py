@@ -11,26 +11,32 @@ from hypothesis import strategies as st
 from panel_table import Table
 
 from lhpost6_pin.control import load_controller
+from lhpost6_pin.control.plug import Feedback
 from lhpost6_pin.core.errors import ControllerError, LhpostError, MotionError, OutOfRangeError
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.interfaces.link import (
     LinkClient,
     LinkMode,
     PlantState,
+    Reading,
     ServedPlant,
     open_socket,
     serve,
 )
+from lhpost6_pin.mechanics.coupled import motion_of_numbers
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.instant import motion_at
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.panel.demand import check_program
 from lhpost6_pin.panel.drive import Drive
-from lhpost6_pin.panel.engine import BLOCK, Engine, Status
+from lhpost6_pin.panel.engine import Engine, Status
+from lhpost6_pin.panel.interlocks import measured_motion
 from lhpost6_pin.panel.moves import Moved, at_rest, move_to
 from lhpost6_pin.panel.orders import Orders
 from lhpost6_pin.panel.programs import Recorded, make_wave
 from lhpost6_pin.panel.recording import record_of_rows
+from lhpost6_pin.panel.reference import BLOCK, Reference
 from lhpost6_pin.panel.ring import ROWS, Ring, RingReader
 from lhpost6_pin.panel.rows import Rows
 from lhpost6_pin.panel.timekeeping import Timekeeping
@@ -211,6 +217,33 @@ def test_the_reference_is_smooth_through_run_hold_span_setpoint_and_stop(kind):
 
 
 @pytest.mark.fast
+def test_a_block_that_is_prepared_is_the_one_that_is_computed_when_it_is_needed():
+    """Bit by bit, whatever is ordered and missed between; until its first sample the drive is as before."""
+    made = []
+    for ahead in (False, True):
+        drive = Drive(NUMBERS, np.full(6, 1.0), np.zeros(6))
+        drive.set_span(np.full(6, 0.1), 0)
+        reference = Reference(drive, lambda *moved: np.hstack(moved))
+        drive.load(sine(frequency=0.7))
+        found, states = [], []
+        for k in [*range(1, 1000), *range(1003, 3000)]:
+            moved, at, inputs = reference.at(k)
+            assert np.array_equal(inputs[at], np.concatenate(moved))
+            found.append(inputs[at])
+            if ahead:
+                reference.prepare(k + 1)
+            states.append(reference.drive.state(k))
+            for when, do in {64: Drive.run, 1500: Drive.hold, 1537: Drive.run, 2000: Drive.stop}.items():
+                if k == when:
+                    reference.changed()
+                    do(reference.drive, reference.end)
+        made.append((np.array(found), states))
+    assert np.array_equal(made[0][0], made[1][0]) and made[0][1] == made[1][1]
+    assert np.abs(made[0][0][:, :6]).max() > 0.09
+    assert {state.state for state in made[0][1]} >= {"running", "holding", "stopping"}
+
+
+@pytest.mark.fast
 def test_a_wave_of_so_many_cycles_ends_by_itself_and_a_motion_at_its_end():
     for program in (make_wave("sine", axes=(1,), frequency=1.0, **GENERATOR, cycles=3.0), recorded()):
         drive = Drive(NUMBERS, np.full(6, 1.0), np.zeros(6))
@@ -271,13 +304,52 @@ def test_a_wave_over_the_link_is_that_in_one_process_whatever_the_controller_s_d
                         client.send(engine.answer(reading))
                         rows.append(engine.row.copy())
                         time.sleep(stall * (reading.sample % 50 == 7))
-                    readings = client.wait(1.0)
+                    readings = client.wait(1.0, poll=1e-4)
             stop.set()
             thread.join(60.0)
         found, names = np.array(rows)[: len(table.recording.rows())], table.rows
         for name in ("sample", "platen_displacement", "platen_acceleration", "actuator_force", "spool_command"):
             assert np.array_equal(names.of(found, name), table.of(name)), name
     assert np.abs(table.of("platen_displacement")[:, 0]).max() > 0.05
+
+
+def test_what_is_prepared_between_samples_changes_no_row(machine):
+    """Neither through a move and a wave, nor a trip amid a block and the start after it."""
+    rows = []
+    for prepare in (False, True):
+        table = Table(machine)
+        if prepare:
+            answer = table.engine.answer
+            table.engine.answer = lambda reading, a=answer, e=table.engine: (a(reading), e.row, e.prepare())[0]
+        table.do("pressure", to="high")
+        table.step(0.3)
+        for do, more in (("setpoint", {"axis": 0, "value": 0.02}), ("span", {"axis": 0, "value": 0.1})):
+            table.do(do, **more)
+            table.step(1.01)
+        table.do("load", sine(frequency=1.0))
+        table.do("run")
+        table.step(0.7)
+        table.do("trip", who="a test")
+        table.step(0.3)
+        table.do("reset")
+        table.step(0.5)
+        rows.append(table.recording.rows())
+    names = table.rows
+    assert np.array_equal(*rows, equal_nan=True) and np.ptp(names.of(rows[0], "platen_displacement")[:, 0]) > 0.02
+
+
+@pytest.mark.fast
+def test_what_is_measured_is_the_motion_of_pose_and_twist():
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        interface, force = rng.uniform(-0.5, 0.5, 18), rng.uniform(-1e6, 1e6, 10)
+        sensors = Feedback(np.zeros(10), rng.uniform(-9.0, 9.0, 6), force)
+        found = measured_motion(Reading(1, PlantState.RUNNING, sensors, 0, 0, interface))
+        motion = motion_of_numbers(interface)
+        # Pinocchio's way by matrices and back: roundings of numbers below 1
+        for got, own in zip(found[:2], motion_at(motion.pose, motion.twist), strict=True):
+            np.testing.assert_allclose(got, own, rtol=0.0, atol=1e-14)
+        assert np.array_equal(found.acceleration, sensors.acceleration) and np.array_equal(found.force, force)
 
 
 def test_the_platen_follows_a_wave_of_its_span_and_returns(table):

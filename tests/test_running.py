@@ -14,11 +14,14 @@ from lhpost6_pin.cli import live_view as live
 from lhpost6_pin.core.errors import SimulationError
 from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from lhpost6_pin.data.records import load_record
+from lhpost6_pin.effects.registry import CODES, LAWS
 from lhpost6_pin.interfaces.link.protocol import Datagram, Kind, LinkMode, encode
 from lhpost6_pin.interfaces.link.served import ServedPlant
 from lhpost6_pin.machine.machine import load_machine
-from lhpost6_pin.mechanics.coupled import rigid_wrench
+from lhpost6_pin.mechanics.coupled import motion_numbers, rigid_wrench
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
+from lhpost6_pin.mechanics.gas_pressure import strut_pressures
+from lhpost6_pin.mechanics.instant import legs_at
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.show.viewer import LiveView
@@ -221,6 +224,70 @@ class Mass:
 
     def step(self, gravity, base, dt):
         return rigid_wrench(self.inertia, base, gravity)
+
+
+def shaken(machine, effects=()):
+    """A running plant of a machine with effects of the library, after a tenth of a second of all its spools."""
+    for family in effects:
+        machine = machine.with_effect(family)
+    own = make_plant(machine)
+    table, at_rest = RunningPlant(own, find_equilibrium(own)), find_equilibrium(own).spool
+    for k in range(200):
+        table.advance(at_rest + 0.1 * np.sin(0.02 * k + np.arange(own.spools)))
+    return table
+
+
+@pytest.mark.parametrize(
+    "name, effects",
+    [
+        ("lhpost6", ()),
+        ("lhpost6", ("strut_gas_leak", "gas_heat_transfer")),  # all laws that act on the gas
+        ("lhpost6", ("supply_droop", "transport_delay")),
+        ("uniaxial", ()),  # guided: it does not turn
+    ],
+)
+def test_readings_in_one_row_are_those_that_are_read_one_by_one(name, effects):
+    table = shaken(machine_named(name), effects)
+    n, sensors, pressures = table.plant.spools, table.sensors(), table.pressures()
+    found = table.readings(pressures=True)
+    motion, gas = found[6 + 2 * n :][:18], found[24 + 5 * n : -1]
+    for got, own in ((found[:6], sensors.acceleration), (found[6:][:n], sensors.displacement)):
+        assert np.array_equal(got, own)  # the same compiled code
+    assert np.array_equal(found[6 + n :][:n], sensors.force)
+    # Pinocchio's motion: other roundings of the same products of numbers below 10
+    np.testing.assert_allclose(motion, motion_numbers(table.interface_motion()), rtol=0.0, atol=1e-13)
+    assert np.abs(motion).max() > 1e-3  # it moves
+    assert np.array_equal(found[24 + 2 * n :][: 3 * n], np.concatenate([pressures.a, pressures.b, pressures.spool]))
+    np.testing.assert_allclose(gas, pressures.strut, rtol=1e-14)  # a power and an exponential, rounded
+    assert found[-1] == pytest.approx(pressures.supply, rel=1e-15)
+    assert np.array_equal(table.readings(), found[: 24 + 2 * n])
+    handled = {int(row["law"]) for row in table.plant.gas_rows}
+    if "strut_gas_leak" in effects:
+        assert handled == {CODES[name] for name, law in LAWS.items() if law.acts_on_gas}
+        assert np.abs(gas / strut_pressures(table.plant.machine, elongations(table)) - 1.0).max() > 1e-6
+
+
+def elongations(table):
+    return legs_at(table.plant, table.interface_motion().pose)[0][table.plant.spools :]
+
+
+def test_readings_that_are_not_finite_stop_the_run(plant, rest):
+    table = RunningPlant(plant, rest)
+    table._ws.z[plant.pressure_states[0][0]] = np.nan
+    table._evaluate(table._ws, rest.spool)
+    with pytest.raises(SimulationError, match=r"stopped at 0\.0000 s: a sensor is not finite"):
+        table.readings()
+
+
+@pytest.mark.parametrize("command", [np.zeros(9), np.full(10, np.nan), np.array([np.inf, *np.zeros(9)])])
+def test_a_command_that_is_refused_changes_nothing(plant, rest, command):
+    table, other = RunningPlant(plant, rest), RunningPlant(plant, rest)
+    with pytest.raises(SimulationError, match="a command is 10 finite spool values"):
+        table.advance(command)
+    for one in (table, other):
+        one.advance(rest.spool + 2.0)
+    assert (table.clipped, table.sample) == (other.clipped, other.sample) == (10, 1)
+    assert np.array_equal(table.readings(True), other.readings(True))
 
 
 def test_pressures_give_the_forces_and_those_of_the_struts_the_hold_down(plant, rest):

@@ -36,6 +36,7 @@ from .filters import NOTCHES
 
 __all__ = ["ACTUATOR", "AXIS", "CANCELLER", "FEEDBACK", "FORCE", "GENERATOR", "MEMORY_ROWS", "POSE", "ControlTables"]
 __all__ += ["Feedback", "control_packed", "control_sample", "control_step", "pack_control", "sense", "sense_packed"]
+__all__ += ["step_packed"]
 
 AXIS = np.dtype(
     [
@@ -324,6 +325,13 @@ def control_packed(sample, drive, tables, buffer, control, memory, command, wind
     """`control_sample` with its tables and workspace packed."""
     plant, ws = unpack_tables(tables), unpack_workspace(buffer)
     return control_sample(sample, drive, plant, ws, unpack_control(control), memory, command, window)
+
+
+@compiled
+def step_packed(sample, drive, displacement, acceleration, force, tables, control, memory, command):
+    """`control_step` with its sensors as arrays and its tables packed."""
+    sensors, plant = Feedback(displacement, acceleration, force), unpack_tables(tables)
+    return control_step(sample, drive, sensors, plant, unpack_control(control), memory, command)
 
 
 @compiled

@@ -18,5 +18,6 @@ def crc_of(datagram: bytes, at: int) -> int:
 def with_crc(datagram: bytes, at: int) -> bytes:
     """The datagram with its CRC-32 filled in at an offset."""
     filled = bytearray(datagram)
-    _CRC.pack_into(filled, at, crc_of(datagram, at))
+    _CRC.pack_into(filled, at, 0)
+    _CRC.pack_into(filled, at, zlib.crc32(filled))
     return bytes(filled)

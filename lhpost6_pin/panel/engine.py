@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..control.controller import Controller, make_controller
-from ..control.loop import control_step
+from ..control.loop import step_packed
 from ..control.settings import ControllerSettings
 from ..core.arrays import Array
 from ..core.errors import ControllerError
@@ -25,12 +25,10 @@ from .drive import Drive
 from .interlocks import INTERLOCKS, Interlocks, Measured, measured_motion
 from .moves import Moved
 from .programs import Program
+from .reference import Reference
 from .rows import PRESSURES, Rows
 
-__all__ = ["BLOCK", "Engine", "Status"]
-
-BLOCK = 32
-"""Samples whose reference is computed together: an order acts within 16 ms, a trip at once."""
+__all__ = ["Engine", "Status"]
 
 
 class Status(NamedTuple):
@@ -64,7 +62,7 @@ class Engine:
     ) -> None:
         """Prepare the controller; it begins at low pressure."""
         self._controller: Controller = make_controller(plant, rest, settings)
-        self._tables = self._controller.tables
+        self._packed = plant.tables.packed, self._controller.tables.packed
         self._interlocks = Interlocks(self._controller, rest, numbers)
         self._rows, self._parked = rows, plant.machine.platen.parked
         limits = plant.machine.limits
@@ -72,16 +70,16 @@ class Engine:
         self._speed = np.where(free, limits.velocity, np.inf)
         self._speed[self._speed == 0.0] = np.inf
         self._tolerance = numbers.number("raised.tolerance") * max(limits.displacement[2], 1e-3)
-        self._drive = Drive(numbers, self._speed, np.zeros(6))
+        self._reference = Reference(Drive(numbers, self._speed, np.zeros(6)), self._controller.drive_for)
         self.pressure, self.trip = "low", ""
         self._number = 0
         self._place, self._lifted, self._state = "raised", True, PlantState.WAITING
         self._memory = self._controller.init()
         self._command = rest.spool.copy()
-        self._block, self._drives, self._first = Moved(*np.zeros((3, 0, 6))), np.zeros((0, 6)), 0
         self._last = 0
-        self._now = Measured(np.zeros(6), np.zeros(6), np.zeros(6), rest.force)
-        self.row = np.full(rows.width, np.nan)
+        self._now = Measured.of(np.concatenate([np.zeros(18), rest.force]))
+        self._row = np.full(rows.width, np.nan)
+        self._answered: tuple[Reading, Moved | None] | None = None  # of which the row is not filled yet
 
     @property
     def commanding(self) -> bool:
@@ -94,6 +92,7 @@ class Engine:
 
         Raises ControllerError with the reason for what cannot be done now.
         """
+        self._reference.changed()
         do = str(order.get("do"))
         actions: dict[str, Callable[[Mapping[str, Any]], None]] = {
             "pressure": self._pressure,
@@ -119,6 +118,7 @@ class Engine:
         """Stop commanding, and end the program; the first reason stays."""
         if not self.trip and self.pressure == "high":
             self.trip = reason
+            self._reference.changed()
             self._drive.take_over(self._now.displacement, self._last)
 
     def _pressure(self, order: Mapping[str, Any]) -> None:
@@ -183,7 +183,11 @@ class Engine:
     @property
     def _next(self) -> int:
         """First sample whose reference is not computed yet."""
-        return max(self._first + len(self._block.value), self._last + 1)
+        return max(self._reference.end, self._last + 1)
+
+    @property
+    def _drive(self) -> Drive:
+        return self._reference.drive
 
     @property
     def _free(self) -> bool:
@@ -201,7 +205,7 @@ class Engine:
         self._memory = self._controller.init_at(place, self._now.force)
         self._drive.take_over(place, self._last)
         self._interlocks.begin()
-        self._block = Moved(*np.zeros((3, 0, 6)))
+        self._reference.clear()
 
     def _near(self, height: float | None) -> bool:
         return height is not None and bool(abs(self._now.displacement[2] - height) < self._tolerance)
@@ -219,23 +223,37 @@ class Engine:
 
     # ------------------------------------------------------------------------------------- samples
     def answer(self, reading: Reading) -> Array | None:
-        """Command (n_actuators,) of the sample that has been read; None: it is not commanded. `row` is filled."""
+        """Command (n_actuators,) of the sample that has been read; None: it is not commanded."""
         sample = reading.sample
         self._last, self._state, now = sample, reading.state, measured_motion(reading)
         self._now = now
         if reading.state == PlantState.TRIPPED:
             self.trip_by("the plant stopped: an actuator reached the end of its stroke, or the run diverged")
-        wanted = self._reference(sample) if self.commanding else None
-        if wanted is not None and (at := self._interlocks.look(now, self._command)) is not None:
-            self.trip_by(self._interlocks.reason(at, sample / SAMPLE_RATE))
-            wanted = None
-        command = None
-        if wanted is not None:
-            command, tables = np.empty(len(self._command)), (self._controller.plant.tables, self._tables)
-            control_step(sample - self._first, self._drives, reading.sensors, *tables, self._memory, command)
-            self._command = command
-        self._fill(reading, now, wanted)
+        command = wanted = None
+        if self.commanding:
+            wanted, k, inputs = self._reference.at(sample)
+            if (at := self._interlocks.look(now, self._command)) is not None:
+                self.trip_by(self._interlocks.reason(at, sample / SAMPLE_RATE))
+                wanted = None
+            else:
+                command = np.empty(len(self._command))
+                step_packed(k, inputs, *reading.sensors, *self._packed, self._memory, command)
+                self._command = command
+        self._answered = reading, wanted
         return command
+
+    def prepare(self) -> None:
+        """Compute what the next sample needs and can be known before it: to be called between two samples."""
+        if self.commanding:
+            self._reference.prepare(self._last + 1)
+
+    @property
+    def row(self) -> Array:
+        """Row of the sample that was answered last (`rows`), filled when it is first read: the command goes first."""
+        if self._answered is not None:
+            self._fill(*self._answered)
+            self._answered = None
+        return self._row
 
     @property
     def status(self) -> Status:
@@ -257,8 +275,8 @@ class Engine:
             self._number,
         )
 
-    def _fill(self, reading: Reading, now: Measured, wanted: Moved | None) -> None:
-        row, places = self.row, self._rows.places
+    def _fill(self, reading: Reading, wanted: Moved | None) -> None:
+        row, places, now = self._row, self._rows.places, self._now
         row[:4] = reading.sample, int(reading.state), self._drive.state(self._last).time, reading.stamp / SECOND
         for name, measured, reference in zip(QUANTITIES, now[:3], wanted or now[:3], strict=True):
             row[places[f"platen_{name}"]], row[places[f"reference_{name}"]] = measured, reference
@@ -269,14 +287,6 @@ class Engine:
         if reading.pressures is not None:
             for name, values in zip(PRESSURES, reading.pressures, strict=True):
                 row[places[name]] = values
-
-    def _reference(self, sample: int) -> Moved:
-        """Reference (6,) each of a sample."""
-        at = sample - self._first
-        if not 0 <= at < len(self._block.value):
-            self._block, self._first, at = self._drive.advance(sample, BLOCK), sample, 0
-            self._drives = self._controller.drive_for(*self._block)
-        return Moved(*(x[at] for x in self._block))
 
 
 def _with_axis(values: Array, order: Mapping[str, Any]) -> Array:

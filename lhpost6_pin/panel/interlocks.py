@@ -5,7 +5,7 @@ rest over what remains of its range; moment of all actuators about the level axe
 along that axis; time during which a spool command is at its limit without a break, over the time stated.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ..interfaces.link import Reading
 from ..machine.parameters import Parameters
 from ..mechanics.actuator_forces import axis_capacity, force_range, wrench_at_bearings
 from ..mechanics.equilibrium import Equilibrium
-from ..mechanics.instant import motion_at
+from ..mechanics.spatial import from_body, rpy_rate, rpy_to_matrix
 from .page_units import in_page_units, place_unit
 
 __all__ = ["INTERLOCKS", "Interlocks", "Measured", "measured_motion"]
@@ -35,12 +35,32 @@ class Measured(NamedTuple):
     velocity: Array
     acceleration: Array
     force: Array
+    numbers: Array  # (18 + n,) all of them
+
+    @classmethod
+    def of(cls, numbers: Array) -> Self:
+        """Measured by its numbers."""
+        return cls(numbers[:6], numbers[6:12], numbers[12:18], numbers[18:], numbers)
 
 
 def measured_motion(reading: Reading) -> Measured:
     """What sensors and the motion of the interface say of the platen."""
-    displacement, velocity = motion_at(reading.motion.pose, reading.motion.twist)
-    return Measured(displacement, velocity, reading.sensors.acceleration, reading.sensors.force)
+    sensors = reading.sensors
+    numbers = np.empty(18 + len(sensors.force))
+    _measure(reading.interface, sensors.acceleration, sensors.force, numbers)
+    return Measured.of(numbers)
+
+
+@compiled
+def _measure(interface, acceleration, force, out):
+    """Fill `Measured.numbers`; the velocity as `instant.motion_at` computes it from pose and twist."""
+    frame = np.empty((3, 3))
+    rpy_to_matrix(interface[3:6], frame)
+    out[:6] = interface[:6]
+    out[6], out[7], out[8] = from_body(frame, interface[6:9])
+    out[9], out[10], out[11] = rpy_rate(frame, interface[9:12])
+    out[12:18] = acceleration
+    out[18:] = force
 
 
 @compiled
@@ -112,7 +132,7 @@ class Interlocks:
     def look(self, now: Measured, command: Array) -> int | None:
         """Number of an interlock whose limit is passed, or None; command (n,) is the last one."""
         full, state = self._spool - 1e-9, (self._run, self.shares, self._worst)
-        _look(np.concatenate(now), command, self._tables, full, self._longest, *state)
+        _look(now.numbers, command, self._tables, full, self._longest, *state)
         over = (self.shares > self.limit) & self.on
         return int(over.argmax()) if over.any() else None
 

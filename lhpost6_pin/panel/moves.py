@@ -30,6 +30,8 @@ class Move:
     def at(self, time: Array) -> Moved:
         """The move at times (n,) [s], not before its beginning."""
         x = np.clip((np.asarray(time) - self.begin) / self.seconds, 0.0, 1.0)[:, None]
+        if x.size and x.min() >= 1.0:  # as the last line but one would give it, in a fifth of the time
+            return Moved(np.tile(self.target, (len(x), 1)), *np.zeros((2, len(x), len(self.target))))
         order = np.arange(6)
         first, second = order[1:], order[2:]
         value = x**order @ self.powers

@@ -20,7 +20,8 @@ class Ring:
 
     def __init__(self, path: Path, width: int) -> None:
         """Map a new file for rows of `width` numbers."""
-        self._rows = np.memmap(path, np.float64, "w+", shape=(ROWS + 1, width))  # row 0 holds the count
+        rows = np.memmap(path, np.float64, "w+", shape=(ROWS + 1, width))  # row 0 holds the count
+        self._rows = np.asarray(rows)  # a plain array is written to in a tenth of the time
         self._count = 0
 
     def write(self, row: Array) -> None:

@@ -15,8 +15,9 @@ import numpy as np
 from ..control.settings import ControllerSettings
 from ..core.errors import LhpostError, LinkError, SimulationError
 from ..core.files import models_folder
+from ..core.names import SAMPLE_RATE
 from ..interfaces.link import LinkClient, LinkMode, PlantState, Reading, ServedPlant, make_faults, open_socket, serve
-from ..interfaces.link.clock import undisturbed
+from ..interfaces.link.clock import SECOND, undisturbed
 from ..interfaces.link.remote import refuse_other_machine
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters, load_parameters
@@ -30,6 +31,8 @@ from .rows import Rows
 __all__ = ["Setup", "control", "panel_numbers", "program_of", "rows_of", "serve_plant"]
 
 _IDLE = 0.1  # [s] between looks at orders
+_POLL = 150e-6  # [s] of polling for the sensors of a plant that catches up
+_HURRIED = 0.9 * SECOND / SAMPLE_RATE  # [ns] between its samples
 _SILENCE = 1.0  # [s] without sensors until the link is lost
 _PATIENCE = 1.0  # [s] that a plant of its own waits for a command before its controller counts as dead
 _OFTEN, _SELDOM = 64, 4  # samples between looks at orders, and such looks between those at what is to be shown
@@ -120,11 +123,14 @@ class _Controller:
     def _session(self, client: LinkClient) -> None:
         """Answer sensors until the session ends."""
         assert self._engine is not None
-        silent, answered, looks = 0.0, 0, 0
+        silent, answered, looks, poll, stamp = 0.0, 0, 0, 0.0, 0
         self._answer(client, self._engine)
         while self._client is client:
             commanded = self._engine.pressure == "high"
-            readings = client.wait(_IDLE if commanded else 0.02)
+            readings = client.wait(_IDLE if commanded else 0.02, poll)
+            if readings:
+                catches_up = 0 < readings[-1].stamp - stamp < len(readings) * _HURRIED / self._setup.pace
+                poll, stamp = _POLL if catches_up else 0.0, readings[-1].stamp
             for reading in readings[-_MOST_UNANSWERED:]:
                 silent, self._reading = 0.0, reading
                 self._answer(client, self._engine)
@@ -154,6 +160,7 @@ class _Controller:
             client.keep()  # a plant of the panel's own waits for commands until it knows that none come
             self._kept = self._reading.sample
         self._ring.write(engine.row)
+        engine.prepare()
 
     def _look(self, show: bool = True) -> None:
         """Take orders and, if it is to be, show the state."""

@@ -8,6 +8,7 @@ The compiled stages and their order are those of `simulate` with the Pinocchio e
 """
 
 import logging
+import math
 from copy import copy
 from functools import partial
 from typing import NamedTuple
@@ -18,6 +19,7 @@ import pinocchio as pin
 from ..control.loop import sense_packed
 from ..control.plug import Feedback
 from ..core.arrays import Array
+from ..core.compiled import compiled
 from ..core.errors import SimulationError
 from ..core.names import SAMPLE_RATE, SCHEMES
 from ..effects.supply import supply_pressures
@@ -32,6 +34,7 @@ from ..mechanics.specimen_mount import top_placement
 from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import make_workspace
 from .coupling import Continued, CouplingOptions, CouplingResult, WithOutside, make_coupling
+from .readings import INTERFACE, read_packed
 from .simulate import diagnosis
 from .snapshot import Snapshot, take_snapshot
 from .trouble import EmptyChambers
@@ -87,6 +90,7 @@ class RunningPlant:
         self._window = np.tile(rest.spool, (steps, 1))
         self._history = np.tile(rest.spool, (_remembered(plant), 1))
         self._path, self._gas = plant.command_path, gas_numbers(plant.machine)
+        self._packed = plant.tables.packed
         self._evaluate(self._ws, np.ascontiguousarray(rest.spool))
 
     @property
@@ -132,6 +136,20 @@ class RunningPlant:
             strut = strut * gas_ratio(plant, z[None])[0]
         return PressureReading(z[first], b, self.spool, strut, float(supply_pressures(plant.supply, z)[0]))
 
+    def readings(self, pressures: bool = False) -> Array:
+        """Sensors, the motion of the interface and, if asked for, `pressures`, as `simulation.readings` orders them.
+
+        In a new array; those of the motion are equal to `interface_motion`, and pressures to `pressures`, to rounding.
+        Raises SimulationError if one of them is not finite.
+        """
+        if self.scheme != SCHEMES[0]:
+            self._evaluate(self._ws, self._window[0])
+        n, struts = self.plant.spools, self._gas.shape[1]
+        out = np.empty(6 + 2 * n + INTERFACE + (3 * n + struts + 1 if pressures else 0))
+        if not read_packed(self._packed, self._ws.buffer, self._window, self._gas, out):
+            raise SimulationError(f"stopped at {self.time:.4f} s: a sensor is not finite")
+        return out
+
     def with_plant(self, plant: Plant) -> "RunningPlant":
         """A running plant that goes on from this state with a plant of the same machine with other effects.
 
@@ -166,6 +184,7 @@ class RunningPlant:
         earlier = np.repeat(self._history[:1], max(0, rows - len(self._history)), axis=0)
         found._history = np.concatenate([earlier, self._history[-rows:]])
         found._path, found._window = plant.command_path, self._window.copy()
+        found._packed = plant.tables.packed
         return found
 
     @property
@@ -192,16 +211,13 @@ class RunningPlant:
         Raises SimulationError for a command or wrench that is not finite, if an actuator or strut leaves its stroke,
         and if the run diverges.
         """
-        command = np.asarray(command, float)
-        if command.shape != (self.plant.spools,) or not np.isfinite(command).all():
+        command = np.ascontiguousarray(command, float)
+        clipped = -1
+        if command.shape == self._history.shape[1:]:
+            clipped = _take_command(command, self.sample, self._path, self._history, self._window)
+        if clipped < 0:
             raise SimulationError(f"a command is {self.plant.spools} finite spool values; got {command}")
-        self.clipped += int(np.count_nonzero(np.abs(command) > 1.0))
-        self._history[:-1] = self._history[1:]
-        self._history[-1] = command.clip(-1.0, 1.0)
-        if self.sample == 0:  # commands before the first one were equal to it
-            self._history[:] = self._window[:] = self._history[-1]
-        first = self.sample - len(self._history) + 1
-        delayed_spools(self._history, first, self.sample, self._path, float(SAMPLE_RATE), self._window)
+        self.clipped += clipped
         self._take(wrench)
         status = self._advance(self._ws, self._window, self._outside)
         self.sample += 1
@@ -226,6 +242,29 @@ class RunningPlant:
             self._since = 0
         elif self._outside is not None:
             self._outside.later(1.0 / SAMPLE_RATE)
+
+
+@compiled
+def _take_command(command, sample, path, history, window):  # type: ignore[no-untyped-def]
+    """Append a command (n_actuators,), clipped, to the history, and fill the window of spools after the valve delay.
+
+    Returns the number of values beyond full stroke; -1, with nothing changed, if one is not finite.
+    """
+    clipped, last = 0, len(history) - 1
+    for x in command:
+        if not math.isfinite(x):
+            return -1
+        clipped += abs(x) > 1.0
+    for i in range(command.size):
+        x = min(1.0, max(-1.0, command[i]))
+        for k in range(last):
+            history[k, i] = history[k + 1, i]
+        history[last, i] = x
+        if sample == 0:  # commands before the first one were equal to it
+            history[:, i] = x
+            window[:, i] = x
+    delayed_spools(history, sample - last, sample, path, float(SAMPLE_RATE), window)
+    return clipped
 
 
 def _remembered(plant: Plant) -> int:

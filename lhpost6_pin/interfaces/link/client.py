@@ -44,8 +44,13 @@ class Reading(NamedTuple):
     sensors: Feedback
     acknowledged: int  # sequence of the newest command that acted
     stamp: int  # the server's clock [ns]
-    motion: BaseMotion  # of the interface, at C in axes of the platen
+    interface: Array  # (18,) motion of the platen at C, position and Euler angles first (`coupled.motion_numbers`)
     pressures: PressureReading | None = None  # where the client asked for them and the server knows them
+
+    @property
+    def motion(self) -> BaseMotion:
+        """Motion of the interface, at C in axes of the platen."""
+        return motion_of_numbers(self.interface)
 
 
 class LinkClient:
@@ -99,6 +104,7 @@ class LinkClient:
         self.machine, self.actuators = welcome.machine, welcome.actuators
         self.counts = np.array(welcome.valves, np.int64)
         self.valves = valve_names(self.actuators, self.counts)
+        self._actuator = np.repeat(np.arange(len(self.counts)), self.counts)  # of each valve
         self.reading = self._read(found[Kind.SENSORS])
 
     def __enter__(self) -> Self:
@@ -122,10 +128,20 @@ class LinkClient:
         found = self._arrived()
         return found[-1] if found else None
 
-    def wait(self, seconds: float) -> list[Reading]:
-        """All sensors that have come since the last look, once some have; none if none come within a time [s]."""
-        select.select([self._sock], [], [], seconds)
-        return self._arrived()
+    def wait(self, seconds: float, poll: float = 0.0) -> list[Reading]:
+        """All sensors that have come since the last look, once some have; none if none come within a time [s].
+
+        poll: time [s] before, in which they are taken a wake-up (about 0.05 ms) sooner and the processor does not rest.
+        """
+        found = self._arrived()
+        if not found and poll:
+            until = now() + round(poll * SECOND)
+            while not found and now() < until:
+                found = self._arrived()
+        if not found:
+            select.select([self._sock], [], [], seconds)
+            found = self._arrived()
+        return found
 
     def _arrived(self) -> list[Reading]:
         found = []
@@ -185,7 +201,7 @@ class LinkClient:
     def _command(self, command: Array, wrench: ArrayLike | None) -> Datagram:
         values = np.asarray(command, float)
         if values.shape == self.counts.shape:
-            values = np.repeat(values, self.counts)
+            values = values.take(self._actuator)
         elif values.shape != (len(self.valves),):
             raise LinkError(
                 f"a command of shape {values.shape}; {self.machine} has {len(self.actuators)} actuators and "
@@ -242,10 +258,10 @@ class LinkClient:
 
     def _get(self, timeout: float) -> Datagram | None:
         """A frame of this session, if a datagram comes within a time [s]."""
-        if not select.select([self._sock], [], [], timeout)[0]:
-            return None
         try:
             frame = decode(self._sock.recv(_LARGEST))
+        except BlockingIOError:
+            return self._get(0.0) if timeout > 0.0 and select.select([self._sock], [], [], timeout)[0] else None
         except ConnectionError:  # no server: no reason to retry at once
             time.sleep(timeout)
             return None
@@ -276,11 +292,11 @@ class LinkClient:
         assert frame.numbers is not None
         numbers, n, at = frame.numbers, len(self.actuators), 6 + 2 * len(self.actuators)
         sensors = Feedback(numbers[6 : 6 + n], numbers[:6], numbers[6 + n : at])
-        motion = motion_of_numbers(numbers[at : at + MOTION])
         pressures = None
         if frame.pressures:
             own = numbers[at + MOTION :]
             pressures = PressureReading(
                 own[:n], own[n : 2 * n], own[2 * n : 3 * n], own[3 * n : 3 * n + frame.struts], float(own[-1])
             )
-        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, motion, pressures)
+        interface = numbers[at : at + MOTION]
+        return Reading(frame.sequence, frame.state, sensors, frame.acknowledged, frame.stamp, interface, pressures)

@@ -100,18 +100,8 @@ from ...core.arrays import Array
 from ...core.checksum import crc_of, with_crc
 from ...core.errors import LinkError, UnknownNameError
 
-__all__ = [
-    "COUNTS",
-    "MOTION",
-    "VERSION",
-    "VersionError",
-    "Datagram",
-    "Kind",
-    "LinkMode",
-    "PlantState",
-    "ShortDatagramError",
-    "Welcome",
-]
+__all__ = ["COUNTS", "MOTION", "VERSION", "Datagram", "Kind", "LinkMode", "PlantState", "ShortDatagramError"]
+__all__ += ["VersionError", "Welcome"]
 __all__ += ["decode", "encode", "find_mode", "is_newer", "refusal"]
 
 
@@ -140,6 +130,7 @@ _ACTUATOR = struct.Struct("<15sB")
 _SWITCH = struct.Struct("<39sB")
 _CRC_AT, _HAS_CRC, _HAS_WRENCH, _HAS_PRESSURES, _STRUTS, _WRAP = 40, 1, 2, 4, 8, 1 << 32
 _WRENCH = 6
+_NUMBER = np.dtype("<f8")
 _FAULT = 39
 """Bytes of a fault's name at most."""
 
@@ -165,6 +156,10 @@ class PlantState(IntEnum):
     """States of the plant."""
 
     WAITING, RUNNING, HOLD, TRIPPED = range(4)
+
+
+_KINDS, _MODES, _STATES = tuple(Kind), tuple(LinkMode), tuple(PlantState)
+_WITH_NUMBERS = Kind.COMMAND, Kind.SENSORS
 
 
 class ShortDatagramError(LinkError):
@@ -235,8 +230,11 @@ def is_newer(sequence: int, than: int) -> bool:
 
 def encode(frame: Datagram) -> bytes:
     """Datagram of a frame, with its CRC-32; raises LinkError for numbers that do not fit its kind and counts."""
-    if frame.kind in (Kind.COMMAND, Kind.SENSORS):
+    flags = _HAS_CRC
+    if frame.kind in _WITH_NUMBERS:
         payload = _finite(frame.numbers).tobytes()
+        if frame.kind == Kind.COMMAND and len(payload) > 8 * frame.valves:
+            flags |= _HAS_WRENCH
     elif frame.kind == Kind.SWITCH:
         payload = _SWITCH.pack(_fault_name(frame.fault), frame.on)
     elif frame.kind == Kind.WELCOME and frame.welcome is not None:
@@ -245,7 +243,6 @@ def encode(frame: Datagram) -> bytes:
         payload += b"".join(_ACTUATOR.pack(_cut(n, 15), v) for n, v in zip(names, valves, strict=True))
     else:
         payload = struct.pack(f"<{len(frame.counts)}Q", *frame.counts)
-    flags = _HAS_CRC if frame.wrench is None else _HAS_CRC | _HAS_WRENCH
     if frame.pressures:
         flags |= _HAS_PRESSURES | frame.struts << _STRUTS
     size = _payload_size(frame.kind, frame.actuators, frame.valves, flags)
@@ -278,9 +275,9 @@ def decode(datagram: bytes) -> Datagram:
         raise LinkError(f"a frame begins with {MAGIC!r}, not {magic!r}")
     if version != VERSION:
         raise VersionError(version, kind, session)
-    if not (1 <= kind <= len(Kind) and mode < len(LinkMode) and state < len(PlantState)):
+    if not (1 <= kind <= len(_KINDS) and mode < len(_MODES) and state < len(_STATES)):
         raise LinkError(f"kind {kind}, mode {mode}, state {state}: one of them does not exist")
-    size = _HEADER.size + _payload_size(Kind(kind), actuators, valves, flags)
+    size = _HEADER.size + _payload_size(kind, actuators, valves, flags)
     if len(datagram) < size:
         raise ShortDatagramError(f"{len(datagram)} bytes of a frame of {size}")
     if len(datagram) > size:
@@ -288,10 +285,10 @@ def decode(datagram: bytes) -> Datagram:
     if crc != (crc_of(datagram, _CRC_AT) if flags & _HAS_CRC else 0):
         raise LinkError("the CRC-32 does not fit: the frame was corrupted")
     counts = actuators, valves, sequence, acknowledged, stamp, echo
-    head = Kind(kind), session, LinkMode(mode), PlantState(state), *counts
+    head = _KINDS[kind - 1], session, _MODES[mode], _STATES[state], *counts
     pressures = bool(flags & _HAS_PRESSURES) and kind in (Kind.HELLO, Kind.SENSORS)
-    if kind in (Kind.COMMAND, Kind.SENSORS):
-        numbers = _finite(np.frombuffer(datagram, "<f8", offset=_HEADER.size)).astype(np.float64)
+    if kind in _WITH_NUMBERS:
+        numbers = _finite(np.frombuffer(datagram, _NUMBER, offset=_HEADER.size)).astype(np.float64)
         return Datagram(*head, numbers=numbers, pressures=pressures, struts=flags >> _STRUTS if pressures else 0)
     if kind == Kind.WELCOME:
         return Datagram(*head, welcome=_unpacked_welcome(datagram, valves))
@@ -305,15 +302,15 @@ def decode(datagram: bytes) -> Datagram:
     return Datagram(*head, counts=struct.unpack_from(f"<{(size - _HEADER.size) // 8}Q", datagram, _HEADER.size))
 
 
-def _payload_size(kind: Kind, actuators: int, valves: int, flags: int) -> int:
-    with_pressures = bool(flags & _HAS_PRESSURES)
-    return {
-        Kind.WELCOME: _WELCOME.size + actuators * _ACTUATOR.size,
-        Kind.COMMAND: 8 * (valves + (_WRENCH if flags & _HAS_WRENCH else 0)),
-        Kind.SENSORS: 8 * (6 + 2 * actuators + MOTION + (3 * actuators + (flags >> _STRUTS) + 1) * with_pressures),
-        Kind.STATUS: 8 * len(COUNTS),
-        Kind.SWITCH: _SWITCH.size,
-    }.get(kind, 0)
+def _payload_size(kind: int, actuators: int, valves: int, flags: int) -> int:
+    if kind == Kind.SENSORS:
+        pressures = 3 * actuators + (flags >> _STRUTS) + 1 if flags & _HAS_PRESSURES else 0
+        return 8 * (6 + 2 * actuators + MOTION + pressures)
+    if kind == Kind.COMMAND:
+        return 8 * (valves + (_WRENCH if flags & _HAS_WRENCH else 0))
+    if kind == Kind.WELCOME:
+        return _WELCOME.size + actuators * _ACTUATOR.size
+    return {Kind.STATUS: 8 * len(COUNTS), Kind.SWITCH: _SWITCH.size}.get(Kind(kind), 0)
 
 
 def _unpacked_welcome(datagram: bytes, valves: int) -> Welcome:
@@ -334,7 +331,7 @@ def _fault_name(name: str) -> bytes:
 
 
 def _finite(numbers: Array | None) -> Array:
-    values = np.asarray(() if numbers is None else numbers, "<f8")
+    values = np.asarray(() if numbers is None else numbers, _NUMBER)
     if not np.isfinite(values).all():
         raise LinkError(f"number {int(np.argmin(np.isfinite(values))) + 1} of a frame is not finite")
     return values

@@ -8,22 +8,19 @@ drops out again and again still commands. In lock-step, where time stands still 
 through the ramp at once.
 
 Faults. Each is a plant of its own, made before a client comes. To go over to it (`RunningPlant.with_plant`) takes
-0.25 ms on an idle core, twice as much on a busy one, beside the sample's own 0.1 to 0.25 ms: the one sample of a switch
+0.25 ms on an idle core, twice as much on a busy one, beside the sample's own 0.1 ms: the one sample of a switch
 may be late in real time, usually by less than a sample, and is then counted as a missed deadline. Two faults at once
 would need a plant for each pair, so one at a time is on.
 """
 
 import logging
 from collections.abc import Hashable, Mapping
-from typing import Any
-
-import numpy as np
 
 from ...control.valves import per_actuator, valve_counts
 from ...core.arrays import Array
 from ...core.errors import LinkError, SimulationError
 from ...core.names import SAMPLE_RATE
-from ...mechanics.coupled import motion_numbers, wrench_of
+from ...mechanics.coupled import wrench_of
 from ...mechanics.equilibrium import Equilibrium
 from ...mechanics.plant import Plant
 from ...simulation.coupling import CouplingOptions
@@ -94,7 +91,7 @@ class ServedPlant:
         self._taken = False
         self._session, self._at_hello, self._heard = 0, self.counts, 0
         self._valves, self._curves = valve_counts(plant.machine), plant.actuators.flow_curve
-        self._width = int(self._valves.sum())
+        self._width, self._spools, self._struts = int(self._valves.sum()), plant.spools, len(plant.machine.struts)
         self._pressures = False
         self._begin()
         for name, faulty in self.faults.items():
@@ -113,7 +110,7 @@ class ServedPlant:
     def _begin(self) -> None:
         """A plant at rest that waits for its first command."""
         self._table = RunningPlant(self.plant, self._rest, coupling=self._coupling)
-        self.state, self.sample, self._sensed = PlantState.WAITING, 0, self._numbers()
+        self.state, self.sample, self._sensed = PlantState.WAITING, 0, self._table.readings(self._pressures)
         self.fault = self._acting = ""
         self._newest = self._acted = self._acted_stamp = self._newest_stamp = self._missed = 0
         self._fresh, self._asked = False, self._rest.spool
@@ -277,10 +274,8 @@ class ServedPlant:
                 self._wrench = None
                 if self.watcher is not None and self._table.sample % EVERY == 0:
                     self.watcher(self._table.snapshot())
-                numbers = self._numbers()
-                if not np.isfinite(numbers).all():
-                    raise SimulationError(f"stopped at {self._table.time:.4f} s: a sensor is not finite")
-                self.sample, self._sensed = self._table.sample, numbers
+                self._sensed = self._table.readings(self._pressures)
+                self.sample = self._table.sample
                 self.counts["samples"] += 1
             except SimulationError as error:
                 self.state = PlantState.TRIPPED
@@ -292,21 +287,11 @@ class ServedPlant:
         return Datagram(kind, self._session, self.mode, self.state, self.plant.spools, self._width)
 
     def _measured(self, now: int) -> bytes:
-        frame = self._frame(Kind.SENSORS)._replace(sequence=self.sample, acknowledged=self._acted, stamp=now)
-        if self._pressures:
-            frame = frame._replace(pressures=True, struts=len(self.plant.machine.struts))
-        return encode(frame._replace(echo=self._acted_stamp, numbers=self._sensed))
+        counts = self._spools, self._width, self.sample, self._acted, now, self._acted_stamp
+        head = Kind.SENSORS, self._session, self.mode, self.state, *counts
+        struts = self._struts if self._pressures else 0
+        return encode(Datagram(*head, numbers=self._sensed, pressures=self._pressures, struts=struts))
 
     def _status(self) -> bytes:
         since = tuple(number - self._at_hello[name] for name, number in self.counts.items())
         return encode(self._frame(Kind.STATUS)._replace(counts=since))
-
-    def _numbers(self) -> Array:
-        """Sensors, motion of the interface and, if asked for, pressures in the order of their frame."""
-        table = self._table
-        sensors, motion = table.sensors(), motion_numbers(table.interface_motion())
-        parts: tuple[Any, ...] = sensors.acceleration, sensors.displacement, sensors.force, motion
-        if self._pressures:
-            *pressures, supply = table.pressures()
-            parts += (*pressures, (supply,))
-        return np.concatenate(parts)

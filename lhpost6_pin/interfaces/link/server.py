@@ -24,6 +24,8 @@ HOST, PORT = "127.0.0.1", 46946
 
 _IDLE = 0.1  # [s] longest wait before looking at the stop event
 _SPIN = 150_000  # [ns] before a deadline that are spent polling, not sleeping: sleep ends up to 0.1 ms late
+_POLL = 150_000  # [ns] of polling for an awaited command before sleeping, which takes 0.05 ms to wake up from
+_CATCHING_UP = 20_000_000  # [ns] most that a clock is behind by a disturbance; one further behind is always too slow
 _BEHIND = 0.1  # [s] most that a clock that waits catches up with
 _LARGEST = 2048  # bytes of a datagram that are read; every frame is shorter
 _BURST = 64  # datagrams taken at most before the plant moves on
@@ -89,7 +91,7 @@ def serve(
                 due = begin + round(sample * SECOND / (SAMPLE_RATE * pace))
                 _listen_until(sock, served, due)
                 if patience:
-                    _await(sock, served, patience, stop)
+                    _await(sock, served, due, patience, stop)
                     begin += max(0, now() - due - round(_BEHIND * SECOND))
                 started = now()
                 _tick(sock, served)
@@ -118,11 +120,15 @@ def _listen_until(sock: socket.socket, served: ServedPlant, due: int) -> None:
             break
 
 
-def _await(sock: socket.socket, served: ServedPlant, seconds: float, stop: threading.Event) -> None:
-    """Receive until an awaited command has come, a time [s] is over, or `stop` is set."""
-    end = now() + round(seconds * SECOND)
+def _await(sock: socket.socket, served: ServedPlant, due: int, seconds: float, stop: threading.Event) -> None:
+    """Receive until an awaited command of a sample due at a time [ns] has come, a time [s] is over, or `stop` is set.
+
+    It is awaited beyond that time by a plant that is behind; one that catches up polls at first.
+    """
+    begin = now()
+    end, sleeps = begin + round(seconds * SECOND), begin + (_POLL if begin - due < _CATCHING_UP else 0)
     while served.awaited and (left := end - now()) > 0 and not stop.is_set():
-        _listen(sock, served, min(left / SECOND, _IDLE))
+        _listen(sock, served, min(left / SECOND, _IDLE) if now() >= sleeps else 0.0)
 
 
 def _listen(sock: socket.socket, served: ServedPlant, timeout: float) -> bool:
@@ -132,10 +138,11 @@ def _listen(sock: socket.socket, served: ServedPlant, timeout: float) -> bool:
 
 def answer_one(sock: socket.socket, timeout: float, answers: Callable[[bytes, Any], Iterable[bytes]]) -> bool:
     """Receive one datagram within a time [s] and send its sender the answers to it; False if there was none."""
-    if not select.select([sock], [], [], timeout)[0]:
-        return False
     try:
-        datagram, sender = sock.recvfrom(_LARGEST)
+        datagram, sender = sock.recvfrom(_LARGEST, socket.MSG_DONTWAIT)
+    except BlockingIOError:
+        arrives = timeout > 0.0 and bool(select.select([sock], [], [], timeout)[0])
+        return arrives and answer_one(sock, 0.0, answers)
     except OSError:  # some systems report here that an earlier answer could not be delivered
         return True
     for answer in answers(datagram, sender):

@@ -39,8 +39,9 @@ class Timing(NamedTuple):
 
 
 def open_socket(host: str = HOST, port: int = PORT) -> socket.socket:
-    """Socket that listens at an address (port 0: any free one); raises LinkError if it cannot be bound."""
+    """Socket that listens at an address (port 0: any free one) and never waits; LinkError if it cannot be bound."""
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.setblocking(False)
     try:
         sock.bind((host, port))
     except (OSError, OverflowError) as error:
@@ -139,10 +140,9 @@ def _listen(sock: socket.socket, served: ServedPlant, timeout: float) -> bool:
 def answer_one(sock: socket.socket, timeout: float, answers: Callable[[bytes, Any], Iterable[bytes]]) -> bool:
     """Receive one datagram within a time [s] and send its sender the answers to it; False if there was none."""
     try:
-        datagram, sender = sock.recvfrom(_LARGEST, socket.MSG_DONTWAIT)
+        datagram, sender = sock.recvfrom(_LARGEST)
     except BlockingIOError:
-        arrives = timeout > 0.0 and bool(select.select([sock], [], [], timeout)[0])
-        return arrives and answer_one(sock, 0.0, answers)
+        return timeout > 0.0 and bool(select.select([sock], [], [], timeout)[0]) and answer_one(sock, 0.0, answers)
     except OSError:  # some systems report here that an earlier answer could not be delivered
         return True
     for answer in answers(datagram, sender):

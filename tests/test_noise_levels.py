@@ -10,13 +10,14 @@ from commands import refused
 from machine_cases import PRACTICE
 from sensor_cases import with_change
 
+from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import RecordError
 from lhpost6_pin.data.check import check_dataset
 from lhpost6_pin.data.consistency import check_sensors
 from lhpost6_pin.data.measured_sensors import compare_noise, find_sensors, measured_sensors, save_sensors
 from lhpost6_pin.data.noise_levels import noise_levels
 from lhpost6_pin.data.observable import observable
-from lhpost6_pin.data.records import load_record, make_record, save_record
+from lhpost6_pin.data.records import load_record, make_record, sample_interval, save_record
 from lhpost6_pin.data.rests import find_rests
 from lhpost6_pin.data.sensors import SensorSet, add_noise, load_sensors
 from lhpost6_pin.data.signals import Band, align, differentiate
@@ -24,6 +25,8 @@ from lhpost6_pin.data.turned_signs import turned_signs
 from lhpost6_pin.machine.components import Floor
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.simulation.rehearse import rehearse
+from lhpost6_pin.tuning.sine import sine_target
 
 TABLE = load_machine("uniaxial")
 PLANT = make_plant(TABLE)
@@ -266,6 +269,27 @@ def test_a_force_with_its_sign_turned_is_found_and_no_other(column):
     moves = column < 4  # a test along x: the vertical actuators hold, and nothing can be said of them
     expected = [f"actuator_force[{machine.actuator_names[column]}]"] * moves
     assert [f.channel for f in turned_signs(turned, machine)] == expected
+
+
+@pytest.mark.parametrize(("axis", "amplitude", "column"), [("x", 0.1, 1), ("z", 0.05, 4)])
+def test_a_turned_force_is_found_in_a_slow_sine_in_which_friction_hides_inertia(axis, amplitude, column):
+    machine = load_machine()
+    target, _, _ = sine_target(axis, amplitude, 0.25)
+    bare = rehearse(machine, target, load_controller("lhpost6"), attrs={}, engine="fused", record_every=8).record
+    record = add_noise(bare, load_sensors(), np.random.default_rng(0))
+    assert turned_signs(record, machine) == []
+    signs = np.where(np.arange(10) == column, -1.0, 1.0)
+    (turned,) = with_change([record], "actuator_force", lambda x: x * signs)
+    (found,) = turned_signs(turned, machine)
+    assert found.channel == f"actuator_force[{machine.actuator_names[column]}]" and "takes energy" in found.message
+
+
+def test_a_late_force_of_inertia_is_no_turned_one():
+    """By 5 ms, white noise of inertia seems to be taken from the platen in part."""
+    machine, record = load_machine(), load_record(PRACTICE)
+    for tau in (-5e-3, 5e-3):
+        (late,) = with_change([record], "actuator_force", lambda x, tau=tau: align(x, tau, sample_interval(record)))
+        assert turned_signs(late, machine) == []
 
 
 def test_a_pressure_difference_with_its_sign_turned_is_an_error_with_the_remedy(tests):

@@ -35,6 +35,7 @@ class MassFit(NamedTuple):
     explained: float  # share of the force's squares that mass and friction explain
     by_mass: float  # share that mass alone explains
     power: float  # mean square of friction's power, signed: below zero where it drives the motion
+    given: float  # mean power to the platen over rms force, about its mean, and rms speed: -1 to 1, at all frequencies
 
 
 def mass_fits(record: xr.Dataset, machine: Machine, numbers: Parameters) -> list[MassFit]:
@@ -66,7 +67,8 @@ def mass_fits(record: xr.Dataset, machine: Machine, numbers: Parameters) -> list
             by_mass = float(x[:, 0] @ y) ** 2 / (float(np.sum(x[:, 0] ** 2)) * whole)
             power = float(np.sum(x[:, 1:] @ coefficient[1:] * x[:, 2]))
             share = float(coefficient[0]) / _mass_moved(machine, rows, i)
-            found.append(MassFit(f"{name}[{label}]", label, share, explained, by_mass, power))
+            given = _mean_power(force, speed[:, i])
+            found.append(MassFit(f"{name}[{label}]", label, share, explained, by_mass, power, given))
     return found
 
 
@@ -78,6 +80,13 @@ def _platen_motion(record: xr.Dataset, high: float, dt: float) -> tuple[Array, A
         return speed, differentiate(speed, dt)
     acceleration = Band(high=high).apply(record["platen_acceleration"].values.astype(float), dt)
     return integrate(acceleration - acceleration.mean(axis=0), dt)[0], acceleration
+
+
+def _mean_power(force: Array, speed: Array) -> float:
+    """Mean power of a force, less its mean, over the product of both rms; zero without either."""
+    varying = force - force.mean()
+    apparent = float(np.sqrt(np.mean(varying**2) * np.mean(speed**2)))
+    return float(np.mean(varying * speed)) / apparent if apparent else 0.0
 
 
 def _mass_moved(machine: Machine, rows: Array, i: int) -> float:

@@ -1,11 +1,11 @@
 """Whether a panel keeps real time, and how often its page is drawn, while a sine of 100 mm and 0.5 Hz runs along x.
 
-    python scripts/panel_pace.py [--minutes 10] [--no-page] [--out DIR]
+    python scripts/panel_pace.py [--minutes 10] [--no-page] [--no-view] [--out DIR]
 
 Starts a panel, takes its controls over the websocket, raises the platen and runs the sine; a page in Chromium without a
 window watches meanwhile, whose frames are counted. Prints the share of samples that were missed or late, safe holds and
-frames a second, and writes panel_pace.json. WebGL is drawn by the processor here, which costs the panel time that it
-does not cost where a graphics card draws.
+frames a second, and writes panel_pace.json. Chromium without a window draws WebGL by the processor, which takes time
+that it does not take where a graphics card draws; --no-view leaves the 3-D view out of the page.
 """
 
 import asyncio
@@ -72,12 +72,14 @@ class Operator:
         await self._do(lambda state: state["program"]["state"] == "running", "run")
 
 
-async def watch(url: str, minutes: float, tab: Tab | None) -> dict[str, Any]:
+async def watch(url: str, minutes: float, view: bool, tab: Tab | None) -> dict[str, Any]:
     """Drive the table for so long: link at the end, samples and their late share of that time, times of frames [ms]."""
     operator = Operator(url)
     await asyncio.wait_for(operator.start(), PATIENCE)
     before = operator.state["link"]
     if tab is not None:
+        if not view:
+            await tab.evaluate("document.getElementById('view').style.display = 'none'")
         await tab.evaluate(COUNT_FRAMES)
     await asyncio.sleep(60.0 * minutes)
     after, state = operator.state["link"], operator.state
@@ -105,6 +107,7 @@ def frames_per_second(times: list[float]) -> dict[str, float]:
 def main(
     minutes: Annotated[float, typer.Option(help="How long the sine runs.")] = 10.0,
     page: Annotated[bool, typer.Option(help="Open the page in Chromium meanwhile.")] = True,
+    view: Annotated[bool, typer.Option(help="With the 3-D view in the page.")] = True,
     out: Annotated[Path, typer.Option(help="Directory of the results.")] = Path("out/panel_pace"),
 ) -> None:
     """Start a panel, drive it and print how it kept time."""
@@ -120,9 +123,9 @@ def main(
             if page:
                 with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
                     patience = 60.0 * minutes + 3 * PATIENCE
-                    found = browse(Path(folder), url, lambda tab: watch(url, minutes, tab), SIZE, patience)
+                    found = browse(Path(folder), url, lambda tab: watch(url, minutes, view, tab), SIZE, patience)
             else:
-                found = asyncio.run(watch(url, minutes, None))
+                found = asyncio.run(watch(url, minutes, view, None))
         finally:
             panel.terminate()
     if frames := found.pop("frames"):

@@ -70,6 +70,20 @@ def test_some_numbers_are_drawn_and_all_others_stay_as_stated():
     assert changed == {path for p in drawn.parameters for path, _ in p.paths}
 
 
+@pytest.mark.parametrize("uncertain", [("*",), ("drive.flow*",), ("drive.flow",)])
+def test_the_flow_at_full_opening_varies_as_stated_where_the_curve_is_hardly_known(uncertain):
+    machine = load_machine("biaxial")  # 150 l/min, 10 % assumed; its curve straight to bent, a factor of two
+    drawn = draw_machines(machine, 512, design="lhs", seed=3, reach=2.0, uncertain=uncertain)
+    values = dict(zip([one.name for one in drawn.parameters], drawn.values.T, strict=True))
+    stated = machine.parameters.number
+    curve = values.get("drive.flow_curve", np.full(512, stated("drive.flow_curve")))
+    full = values["drive.flow"] * (1.0 - np.exp(-curve))
+    usual = stated("drive.flow") * (1.0 - np.exp(-stated("drive.flow_curve")))
+    # a normal of 0.1 within two deviations has one of 0.088; strata make that exact within a per cent
+    assert np.std(np.log(full / usual)) == pytest.approx(0.088, rel=0.03)
+    assert np.mean(np.log(full / usual)) == pytest.approx(0.0, abs=0.002)
+
+
 def test_one_machine_is_the_machine_as_stated():
     assert not draw_machines(load_machine(), 1, design="lhs", seed=5, reach=3.0).coordinates.any()
 

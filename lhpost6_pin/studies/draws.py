@@ -1,5 +1,6 @@
 """Machines drawn from stated uncertainties by Latin hypercube or Sobol sequence."""
 
+import math
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import NamedTuple
@@ -10,6 +11,7 @@ from ..core.arrays import Array
 from ..core.errors import ParameterError, UnknownNameError
 from ..identification.calibration import machine_parameters
 from ..identification.calibration.free_parameters import FreeParameter
+from ..laws.orifice import opening
 from ..machine.machine import Machine
 
 __all__ = ["DESIGNS", "Draws", "draw_machines"]
@@ -38,7 +40,9 @@ def draw_machines(
     """Draw the uncertain numbers of a machine from their priors, normal within `reach` standard deviations.
 
     `uncertain` are patterns of names, such as ``hydraulics.*``; identical components stay identical, and no number is
-    drawn beyond what a machine can have. One machine is the machine as stated.
+    drawn beyond what a machine can have. One machine is the machine as stated. Where the curve of a valve is known
+    within a factor only, and the deviation of its flow contains that of the curve, as in a drafted machine, what is
+    stated is the flow at full opening: the two are drawn together, so that this varies by the rest of that deviation.
 
     Raises UnknownNameError for a design that does not exist, ParameterError for a pattern without a parameter or a
     number of machines that a Sobol sequence does not fill.
@@ -64,7 +68,24 @@ def draw_machines(
     sd = np.array([one.sd for one in parameters])
     low = np.maximum(-reach, [one.lowest / one.sd for one in parameters])
     high = np.minimum(reach, [one.highest / one.sd for one in parameters])
-    return Draws(parameters, np.asarray(sd * truncnorm.ppf(uniform, low, high), float))
+    coordinates = np.asarray(sd * truncnorm.ppf(uniform, low, high), float)
+    _tie_flows(every, parameters, coordinates)
+    return Draws(parameters, coordinates)
+
+
+def _tie_flows(every: Sequence[FreeParameter], parameters: Sequence[FreeParameter], coordinates: Array) -> None:
+    """Draw flows together with curves that are known within a factor only, in place, coordinates (n, k)."""
+    place = {one.name: i for i, one in enumerate(parameters)}
+    for curve in (one for one in every if one.name.endswith(".flow_curve") and one.form == "log"):
+        flow = next((one for one in parameters if one.name == curve.name.removesuffix("_curve")), None)
+        if flow is None or flow.form != "log" or flow.sd < curve.sd:
+            continue
+        rest = math.sqrt(math.expm1(flow.sd) ** 2 - math.expm1(curve.sd) ** 2)  # of the relative deviations
+        column = coordinates[:, place[flow.name]]
+        column *= rest / flow.sd
+        if curve.name in place:
+            drawn = [curve.at(float(x)) for x in coordinates[:, place[curve.name]]]
+            column -= np.log([opening(1.0, x) / opening(1.0, curve.value) for x in drawn])
 
 
 def _uniform(design: str, count: int, dimensions: int, seed: int) -> Array:

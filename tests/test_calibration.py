@@ -500,6 +500,17 @@ def test_what_was_turned_is_found_and_the_rest_stays(found, truth):
     assert np.median(np.abs(off)) < 1.2  # exact predictions give 0.67; with 37 parameters the median scatters by 0.15
 
 
+def test_delays_are_those_of_the_records_with_what_was_removed_before_the_fit(found, campaign):
+    """Pressures, aligned with forces first, were given the delay of forces."""
+    attrs, removed = campaign.records[0].attrs, {one.group for one in found.delays}
+    assert "chamber_pressure" in removed
+    for group in ("actuator_force", "chamber_pressure"):
+        i = found.names.index(f"delay {group}")
+        true = float(attrs[f"true_delay_{group}"]) - float(attrs["true_delay_platen_displacement"])
+        # the fused motion is later than displacements by a share of the other sensors' delays, some microseconds
+        assert found.estimate[i] == pytest.approx(true, abs=4.0 * found.sd[i] + 1e-5)
+
+
 def test_simulation_is_a_second_opinion_that_agrees(found, truth):
     simulated = found.subsets[-1]
     count = len(found.parameters)

@@ -149,9 +149,12 @@ def test_shares_of_valves_and_strokes_are_rates_over_speeds_and_elongations_over
     speeds = (1.0 - plant.machine.limits.valve_reserve) * actuator_speeds(plant)
     assert found["actuator velocity"].names == plant.machine.actuator_names
     assert found["actuator velocity"].of.endswith("less the reserve of 15 %")
-    limits = plant_limits(plant)  # of reports and ensembles: the same measure, so that none contradicts the refusal
-    np.testing.assert_array_equal(limits["actuator_extending"], speeds[:, 0])
-    np.testing.assert_array_equal(limits["actuator_retracting"], speeds[:, 1])
+    limits = plant_limits(plant)  # of what was achieved, by reports and ensembles: feedback has had its reserve
+    np.testing.assert_array_equal(limits["actuator_extending"], actuator_speeds(plant)[:, 0])
+    np.testing.assert_array_equal(limits["actuator_retracting"], actuator_speeds(plant)[:, 1])
+    after = {demand.quantity: demand for demand in make_motion_check(plant, achieved=True)(still, velocity, still)}
+    np.testing.assert_allclose(after["actuator velocity"].share, 0.85 * share, rtol=1e-12)  # of the reserve of 15 %
+    assert "reserve" not in after["actuator velocity"].of
     assert share[0, 4] == pytest.approx(0.1 / speeds[4, 0])
     assert share[1, 4] == pytest.approx(0.1 / speeds[4, 1])
     assert np.all(found["actuator stroke"].share == 0.0)

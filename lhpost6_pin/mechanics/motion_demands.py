@@ -26,14 +26,15 @@ OVERTURNING = ("roll", "pitch")
 OF_SPEED = "of the unloaded velocity of its valves"
 
 
-def make_motion_check(plant: Plant) -> MotionCheck:
+def make_motion_check(plant: Plant, *, achieved: bool = False) -> MotionCheck:
     """Return the demands of a motion (displacement, velocity, acceleration of C and Euler angles, (n, 6) each).
 
-    Valves can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load.
+    Valves can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load. In a
+    motion that was `achieved` these have taken what they needed: there is no reserve.
     Raises SimulationError or OutOfRangeError if the actuators cannot hold what is mounted at rest.
     """
     machine = plant.machine
-    reserve = machine.limits.valve_reserve
+    reserve = 0.0 if achieved else machine.limits.valve_reserve
     speeds, of_speed = (1.0 - reserve) * actuator_speeds(plant), f"{OF_SPEED} less the reserve of {100 * reserve:g} %"
     strokes, names = np.array([a.stroke for a in machine.actuators]), machine.actuator_names
     strength, rest = stated_strength(machine.parameters), rest_forces(plant)

@@ -29,7 +29,7 @@ LIMIT_NAMES = (
     "actuator_stroke",  # (n_act,) one-sided [m]
     "actuator_force",  # (n_act,) largest force [N]; of pushing alone where actuator_pull is given
     "actuator_pull",  # (n_act,) magnitude of the largest pulling force [N]; 0: it cannot pull
-    "actuator_extending",  # (n_act,) speed of the unloaded piston at full spool less limits.valve_reserve [m/s]
+    "actuator_extending",  # (n_act,) speed of the unloaded piston at full spool [m/s]
     "actuator_retracting",  # (n_act,) the other way [m/s]
     "supply_pressure",  # [Pa]
     "strut_area",  # (n_strut,) [m2]: gas pressure times area is the pull of a strut
@@ -61,12 +61,12 @@ class ForceUse(NamedTuple):
 def plant_limits(plant: Plant) -> Limits:
     """Limits of a plant: Table 2.2, strokes, velocities and forces of actuators, supply, strut areas.
 
-    Velocities are those by which a target is checked (`mechanics.motion_demands`): less limits.valve_reserve.
-    Raises SimulationError if the actuators cannot hold what is mounted.
+    Velocities are those by which an achieved motion is judged (`mechanics.motion_demands`). Raises SimulationError if
+    the actuators cannot hold what is mounted.
     """
     machine, supply = plant.machine, plant.supply
     area_a, area_b = plant.actuators.area_a, plant.actuators.area_b
-    speeds = (1.0 - machine.limits.valve_reserve) * actuator_speeds(plant)
+    speeds = actuator_speeds(plant)
     return checked_limits(
         {
             "displacement": machine.limits.displacement,

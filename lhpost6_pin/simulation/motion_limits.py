@@ -75,10 +75,13 @@ class Judgement(NamedTuple):
 
 
 def judge_motion(plant: Plant, motion: PlatenMotion, target: Target | None = None) -> Judgement:
-    """Demands of a motion on all limits, none refused; raises as `make_motion_check` does."""
-    bounds, check = _axis_limits(plant), make_motion_check(plant)
-    fits = None if target is None else largest_scale(target, bounds, check)
-    return Judgement(limit_peaks(motion, bounds, check), fits)
+    """Demands of an achieved motion on all limits, none refused; raises as `make_motion_check` does.
+
+    Of these the flow of the valves is what they can feed; for the scale at which the target fits, less the reserve.
+    """
+    bounds = _axis_limits(plant)
+    fits = None if target is None else largest_scale(target, bounds, make_motion_check(plant))
+    return Judgement(limit_peaks(motion, bounds, make_motion_check(plant, achieved=True)), fits)
 
 
 def judge_record(plant: Plant, record: xr.Dataset, *, fits: bool = True) -> Judgement | None:

@@ -31,6 +31,7 @@ from .normal_equations import NoiseBias, NormalEquations, bounded_step
 from .prepare import prepare_problem
 from .problem import OperatingPoint, Problem
 from .result import Calibration, calibration_numbers
+from .sensor_errors import removed_of
 from .simulated_residuals import by_simulation
 from .subset_estimates import subset_estimates
 from .whitened_residuals import mean_squares, negative_log_likelihood
@@ -73,8 +74,11 @@ def calibrate(
     found = solve(problem, numbers, np.zeros(len(problem.prior)), between(report, 0.1, 0.8))
     normal, floor = found.normal, numbers.number("fit.floor") * problem.prior
     draws = problem.noisy[: int(numbers.number("simulation.draws")) * len(records)]
-    factor = scatter_factor(normal, found.at)
+    factor, zero = scatter_factor(normal, found.at), np.zeros(len(problem.parameters))
+    removed, variance = (np.append(zero, of) for of in removed_of(problem.unknowns, problem.delays))
+    subsets = list(subset_estimates(normal, found.at, factor, floor, numbers))
     simulated = by_simulation(problem, draws, found.x, numbers, between(report, 0.8, 1.0))
+    subsets += [simulated] if simulated else []
     report(1.0)
     return Calibration(
         machine=problem.machine,
@@ -86,10 +90,10 @@ def calibrate(
         parameters=problem.parameters,
         unknowns=problem.unknowns,
         prior=problem.prior,
-        estimate=found.x,
-        covariance=covariance_of_estimate(normal, factor) + np.diag(floor**2),
+        estimate=found.x + removed,
+        covariance=covariance_of_estimate(normal, factor) + np.diag(floor**2 + variance),
         alone=np.hypot(normal.alone(problem.prior), floor),
-        subsets=(*subset_estimates(normal, found.at, factor, floor, numbers), *([simulated] if simulated else [])),
+        subsets=tuple(one._replace(estimate=one.estimate + removed) for one in subsets),
         misfit_before=found.misfit_before,
         misfit_after=misfit(problem, found.residual),
         rounds=found.rounds,

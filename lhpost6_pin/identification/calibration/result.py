@@ -15,7 +15,7 @@ from .curves import Curves
 from .free_parameters import FreeParameter, with_parameters
 from .friction_forms import FrictionForms
 from .scale import Ratio, Scale, ratios
-from .sensor_errors import RemovedDelay, SensorUnknown
+from .sensor_errors import RemovedDelay, SensorUnknown, removed_of
 
 __all__ = [
     "Calibration",
@@ -50,7 +50,7 @@ class Calibration(Shown):
     parameters: tuple[FreeParameter, ...]
     unknowns: tuple[SensorUnknown, ...]
     prior: Array  # (p,) standard deviations
-    estimate: Array  # (p,) coordinates
+    estimate: Array  # (p,) coordinates; of delays with what was removed before the fit
     covariance: Array  # (p, p) predicted
     alone: Array  # (n_tests, p) predicted deviations if there were only that test
     subsets: tuple[Subset, ...]
@@ -157,6 +157,8 @@ def verdict_on(calibration: Calibration, i: int) -> Verdict:
         one = calibration.parameters[i]
         low = -np.inf if one.natural and one.lowest > low else max(low, one.lowest)
         high = min(high, one.highest)
+    else:
+        x -= removed_of(calibration.unknowns, calibration.delays)[0][i - count]
     if not low + 1e-6 * prior < x < high - 1e-6 * prior:
         return "at its bound"
     if beyond(calibration)[i]:

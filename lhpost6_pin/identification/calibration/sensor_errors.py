@@ -74,6 +74,15 @@ def removed_delays(delays: Mapping[str, Delay], sensors: SensorSet) -> tuple[Rem
     )
 
 
+def removed_of(unknowns: Sequence["SensorUnknown"], delays: Sequence[RemovedDelay]) -> tuple[Array, Array]:
+    """What was removed before the fit of each unknown (k,), and its variance (k,): of delays of groups, else zero."""
+    group = {f"delay {one.group}": one for one in delays}
+    found = [group.get(one.name) for one in unknowns]
+    each = [(0.0, 0.0) if one is None else (one.delay, one.deviation**2) for one in found]
+    delay, variance = np.array(each).reshape(-1, 2).T
+    return delay, variance
+
+
 def sensor_unknowns(machine: Machine, sensors: SensorSet, test: MeasuredTest) -> tuple[SensorUnknown, ...]:
     """Unknown errors of the channels that a test has, for which the sensors state a range."""
     labels = {"axis": AXES, **machine.labels}

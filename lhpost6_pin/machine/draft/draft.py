@@ -143,7 +143,7 @@ def _valve(
     speed = flow * full * speed_per_flow
     evidence = "derived" if stated.evidence == "measured" else "assumed"
     found = {
-        "flow": Quantity(flow, "m3/s", evidence, f"{how}; {stated.source}", sd),
+        "flow": Quantity(flow, "m3/s", evidence, f"{how}; {stated.source}; with the deviation of the curve", sd),
         "flow_curve": basis.typical["valve.flow_curve"],
         "leakage": basis.assumed(
             "cylinder.leakage", "m3/s/Pa", areas[0] * speed / high, "full flow over supply pressure"

@@ -273,7 +273,10 @@ def test_machines_that_cannot_be_are_refused_and_leave_no_file(lhpost6, tmp_path
 def test_two_numbers_that_determine_the_same_are_refused_and_leave_no_file(lhpost6, tmp_path):
     """Of a speed per volt, too, which is a slope of its own name once it is read."""
     flow = ("--speed", "0.05 m/s/V", "--voltage", "10", "--rated-flow", "10 l/min")
-    for more, words in ((flow, ("--speed and --rated-flow", "leave out")), (("--bore", "63 mm"), ("--area and --bore",))):
+    for more, words in (
+        (flow, ("--speed and --rated-flow", "leave out")),
+        (("--bore", "63 mm"), ("--area and --bore",)),
+    ):
         assert refused(lhpost6("new-machine", "it", *options(KNOWN), *more), *words)
     assert not list(tmp_path.glob("*.toml"))
     with pytest.raises(ParameterError, match="--speed and --rated-flow"):

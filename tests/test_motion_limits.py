@@ -180,8 +180,8 @@ def test_a_motion_beyond_one_open_valve_states_what_both_admit():
         check_motion_limits(plant, target)
     both = make_plant(load_machine().with_valves(2))
     fits = fitting_scale(both, target)
-    words = "With both servovalves of each horizontal actuator open (--valves 2, or horizontal.valves = 2 in an override)"
-    assert f"{words} the largest scale is {fits:g}. With the other reading" in str(caught.value)
+    words = "With both servovalves of each horizontal actuator open (--valves 2, or horizontal.valves = 2 in an "
+    assert f"{words}override) the largest scale is {fits:g}. With the other reading" in str(caught.value)
     assert fits > 1.3 > caught.value.largest_scale
     check_motion_limits(both, target)
     with pytest.raises(OutOfRangeError) as caught:

@@ -118,7 +118,7 @@ def _axis_limits(plant: Plant) -> MotionLimits:
 
 
 def _with_more_valves(plant: Plant, target: Target, least: float | None) -> str:
-    """The scale that fits with all servovalves open, as a sentence; empty if they are, or if it is not above `least`."""
+    """The scale that fits with all servovalves open, as a sentence; empty if they are, or it is not above `least`."""
     machine = with_all_valves(plant.machine)
     pairs = zip(plant.machine.actuators, machine.actuators, strict=True)
     opened = [full for now, full in pairs if full.valves > now.valves]
@@ -130,8 +130,8 @@ def _with_more_valves(plant: Plant, target: Target, least: float | None) -> str:
     kind, count = opened[0].kind, opened[0].valves
     every = "both servovalves" if count == 2 else f"all {count} servovalves"
     return (
-        f". With {every} of each {kind} actuator open (--valves {count}, or {kind}.valves = {count} in an override) the "
-        f"largest scale is {fits:g}"
+        f". With {every} of each {kind} actuator open (--valves {count}, or {kind}.valves = {count} in an override) "
+        f"the largest scale is {fits:g}"
     )
 
 

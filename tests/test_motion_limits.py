@@ -204,7 +204,7 @@ def test_where_more_valves_mend_nothing_none_are_proposed():
 def test_the_help_of_valves_states_the_number_in_the_machine_file():
     (help,) = (option.help for option in Valves.__metadata__)
     numbers = {a.valves for a in load_machine().actuators if a.area_b is not None}
-    assert numbers == {1} and f"for the LHPOST6 1 of its {ALL_VALVES}" in help
+    assert numbers == {1} and f"LHPOST6: 1 of {ALL_VALVES}" in help
 
 
 def test_tilt_of_pistons_and_upward_acceleration_have_limits_of_their_own():

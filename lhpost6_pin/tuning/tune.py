@@ -104,7 +104,7 @@ def _finite(value: float, form: str, unit: str) -> str:
     return f"{value:{form}} {unit}" if np.isfinite(value) else "unlimited"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Tuning(Shown):
     """Result of a tuning: settings, the steps to them, and every axis before and after."""
 

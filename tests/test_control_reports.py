@@ -121,6 +121,18 @@ def test_a_tuning_that_follows_with_margin_is_good_and_shows_what_changed(tmp_pa
     assert f"velocity feedforward {old:#.3g} → {1.5 * old:#.3g}" in page.words
 
 
+def test_a_band_that_ends_at_a_mode_of_the_specimen_is_referred_to_the_iteration(tmp_path, capsys, machine, settings):
+    ends = make_tuning(machine, settings, band_after=(0.0625, 2.44), limited_by_specimen=True)
+    page = Reader(write_tune_report(ends, tmp_path / "t.html"))
+    level, verdict = page.verdict
+    words = "In x the band ends near a mode of the specimen"
+    assert level == "attention" and words in verdict and "lhpost6 iterate" in verdict
+    print_tuning(ends)
+    assert words in " ".join(capsys.readouterr().out.split())
+    beyond = make_tuning(machine, settings, limited_by_specimen=True)  # follows beyond 20 Hz: nothing to correct
+    assert words not in Reader(write_tune_report(beyond, tmp_path / "b.html")).verdict[1]
+
+
 @pytest.mark.parametrize(
     ("changes", "level", "said"),
     [

@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 from machine_cases import plant_named
 
+from lhpost6_pin.cli.options import Valves
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import OutOfRangeError, SimulationError
 from lhpost6_pin.core.names import SAMPLE_RATE
@@ -15,6 +16,7 @@ from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.machine.machine import build_machine, load_machine
 from lhpost6_pin.machine.strength import stated_strength
 from lhpost6_pin.mechanics.actuator_forces import axis_capacity, force_range, required_forces, rest_forces
+from lhpost6_pin.mechanics.capacity import ALL_VALVES
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.instant import platen_pose_at, required_wrench_at, wrench_at
 from lhpost6_pin.mechanics.motion_demands import make_motion_check
@@ -168,6 +170,41 @@ def test_a_motion_beyond_the_valves_says_what_the_other_reading_of_eq_4_2_admits
     other = make_plant(plant.machine.with_flow_reading("full_stroke"))
     fits = fitting_scale(other, target)
     assert str(caught.value).endswith(f"the largest scale is {fits:g}") and fits > caught.value.largest_scale
+
+
+def test_a_motion_beyond_one_open_valve_states_what_both_admit():
+    """Ridgecrest at 1.3: the horizontal valves are exceeded; with both open its own largest scale is the one stated."""
+    plant = plant_named("lhpost6")
+    target = make_target(find_motion("ridgecrest"), scale=1.3, rate=float(SAMPLE_RATE))
+    with pytest.raises(OutOfRangeError, match="actuator velocity") as caught:
+        check_motion_limits(plant, target)
+    both = make_plant(load_machine().with_valves(2))
+    fits = fitting_scale(both, target)
+    words = "With both servovalves of each horizontal actuator open (--valves 2, or horizontal.valves = 2 in an "
+    assert f"{words}override) the largest scale is {fits:g}. With the other reading" in str(caught.value)
+    assert fits > 1.3 > caught.value.largest_scale
+    check_motion_limits(both, target)
+    with pytest.raises(OutOfRangeError) as caught:
+        check_motion_limits(both, with_scale(target, 2.0 * fits))
+    assert "--valves" not in str(caught.value)  # all are open
+
+
+def test_where_more_valves_mend_nothing_none_are_proposed():
+    """The flow of the vertical actuators, which have one servovalve each, and of a machine with no more than it has."""
+    target = make_target(find_motion("sine", axis="z", amplitude=0.1, period=0.8), rate=2048.0)
+    with pytest.raises(OutOfRangeError, match="actuator velocity") as caught:
+        check_motion_limits(plant_named("lhpost6"), target)
+    assert "--valves" not in str(caught.value)
+    target = make_target(find_motion("sine", axis="x", amplitude=0.1, period=0.3), axes="x", rate=2048.0)
+    with pytest.raises(OutOfRangeError, match="actuator velocity") as caught:
+        check_motion_limits(plant_named("uniaxial"), target)
+    assert "--valves" not in str(caught.value)
+
+
+def test_the_help_of_valves_states_the_number_in_the_machine_file():
+    (help,) = (option.help for option in Valves.__metadata__)
+    numbers = {a.valves for a in load_machine().actuators if a.area_b is not None}
+    assert numbers == {1} and f"LHPOST6: 1 of {ALL_VALVES}" in help
 
 
 def test_tilt_of_pistons_and_upward_acceleration_have_limits_of_their_own():

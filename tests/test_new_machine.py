@@ -86,6 +86,8 @@ def test_a_number_that_cannot_be_read_is_refused_with_its_name(text, words):
         ({"mass": "1 2 t"}, "--mass: 2 numbers for the axes x"),
         ({"area": None, "bore": "80 mm"}, "--rod is missing"),
         ({"rod": "90 mm", "area": None, "bore": "80 mm"}, "not thinner than --bore"),
+        ({"bore": "63 mm"}, "--area and --bore both determine the piston's area: leave out --area if .* else --bore"),
+        ({"speed": "0.5 m/s", "rated_flow": "10 l/min"}, "--speed and --rated-flow both .*: leave out --speed if"),
     ],
 )
 def test_answers_that_make_no_machine_are_refused_by_option(change, words):
@@ -268,6 +270,19 @@ def test_machines_that_cannot_be_are_refused_and_leave_no_file(lhpost6, tmp_path
     assert not list(tmp_path.glob("*.toml"))
 
 
+def test_two_numbers_that_determine_the_same_are_refused_and_leave_no_file(lhpost6, tmp_path):
+    """Of a speed per volt, too, which is a slope of its own name once it is read."""
+    flow = ("--speed", "0.05 m/s/V", "--voltage", "10", "--rated-flow", "10 l/min")
+    for more, words in (
+        (flow, ("--speed and --rated-flow", "leave out")),
+        (("--bore", "63 mm"), ("--area and --bore",)),
+    ):
+        assert refused(lhpost6("new-machine", "it", *options(KNOWN), *more), *words)
+    assert not list(tmp_path.glob("*.toml"))
+    with pytest.raises(ParameterError, match="--speed and --rated-flow"):
+        draft_machine("it", read_answers({**KNOWN, "speed": "0.05 m/s/V", "rated_flow": "10 l/min"}, 10.0))
+
+
 def test_the_command_has_an_option_for_every_question():
     assert {field.name for field in fields(Answers)} == set(ASKED)
 
@@ -300,6 +315,14 @@ def test_on_a_terminal_it_asks_for_what_is_not_given_and_again_for_what_cannot_b
     texts = {"mass": "310 kg +- 20 %"}
     assert ask(texts, None, None, None) == ("x", "double-rod", 10.0)
     assert texts == SMALL and not left
+
+
+def test_on_a_terminal_it_asks_for_no_number_that_another_given_determines(typed):
+    texts = {**KNOWN, "bore": "63 mm", "rod": "30 mm", "rated_flow": "10 l/min"}
+    del texts["area"]
+    known, left = dict(texts), typed(*[""] * 10)  # axes, cylinders, size, length, return pressure, rated drop, ...
+    assert ask(texts, None, None, None) == ("x", "double-rod", None)
+    assert texts == known and not left
 
 
 def test_of_a_platform_it_asks_for_its_legs(typed):

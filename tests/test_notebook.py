@@ -1,14 +1,18 @@
 """Reports of results in a notebook."""
 
+import html
+import re
+
 import numpy as np
 import pytest
 from machine_cases import PRACTICE
 from run_cases import driven
 
+from lhpost6_pin.core.shown import Shown
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.identification.decompose import decompose_record
-from lhpost6_pin.show.notebook import show_report, show_summary
+from lhpost6_pin.show.notebook import _write, show_report, show_summary
 from lhpost6_pin.show.report.run_limits import NOT_EVALUATED
 from lhpost6_pin.simulation.outputs import record_of_run
 from lhpost6_pin.simulation.rehearse import SimulatedTest
@@ -58,3 +62,26 @@ def test_a_result_shows_its_report_and_the_head_of_it(machine):
         assert title in head and 'class="verdict' in head and 'class="tiles"' in head
         assert "<script" not in head and len(head) < 0.02 * len(page)  # a notebook keeps it for every cell
         assert result._repr_html_() == show_summary(result)._repr_html_()
+
+
+def test_a_result_prints_the_head_of_its_report_and_never_its_arrays(machine):
+    """Oracle: the summary in a notebook, read by the parser of the pages' tests, has every line."""
+    decomposed = decompose_record(machine, load_record(PRACTICE).isel(time=slice(0, 4096)), load_sensors("lhpost6"))
+    run = driven(machine, np.zeros((200, len(machine.actuators))))
+    for result in (decomposed, SimulatedTest(run, record_of_run(run, {"test": "at <rest> & \u201cquiet\u201d"}))):
+        lines = str(result).splitlines()
+        shown = " ".join(html.unescape(re.sub(r"<[^>]*>", " ", show_summary(result).page)).split())
+        assert 3 <= len(lines) <= 10 and max(map(len, lines)) < 1000
+        kind, _, title = lines[0].partition(": ")
+        assert kind in shown and title in shown and lines[1] in shown
+        for line in lines[2:]:
+            assert line.startswith("- ") and line[2:].partition(": ")[0] in shown
+        assert "array(" not in str(result) and "<span" not in str(result)
+        assert repr(result) == f"<{type(result).__name__}: print() gives its verdict, plot() its report>"
+    assert "at <rest> & \u201cquiet\u201d" in lines[0]
+
+
+def test_every_result_with_a_report_has_the_short_repr():
+    """A dataclass without repr=False makes its own, which prints all arrays."""
+    kinds = [kind for kind in _write.registry if issubclass(kind, Shown)]
+    assert len(kinds) == 7 and all(kind.__repr__ is Shown.__repr__ for kind in kinds)

@@ -15,6 +15,7 @@ from lhpost6_pin.core.errors import SimulationError
 from lhpost6_pin.data.transfer import Transfer
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.specimen_modes import specimen_modes
 from lhpost6_pin.tuning import identify
 from lhpost6_pin.tuning import tune as tuning
 from lhpost6_pin.tuning.bandwidth import bandwidth_limitation
@@ -213,13 +214,33 @@ def test_what_limits_a_band_is_said_even_where_there_is_none(plant):
     good = np.ones((len(f), 1))
 
     def words(response, coherence, band):
-        return bandwidth_limitation(plant, Transfer(f, response, coherence, ("x",)), band, 3.0, 0.8, 33.0)
+        found = bandwidth_limitation(plant, Transfer(f, response, coherence, ("x",)), band, 3.0, 0.8, 33.0)
+        assert not found.by_specimen
+        return found.summary
 
     assert words(ones, good, (0.125, 40.0)) == "follows to 33 Hz and beyond"
     assert words(3 * ones, good, (np.nan, np.nan)).startswith("gain +9.5 dB at 1 Hz")
     assert words(ones, 0.5 * good, (np.nan, np.nan)).startswith("coherence 0.50 at 1 Hz")
     both = words(0.5 * ones, 0.5 * good, (0.125, 20.0))
     assert "coherence 0.50 at 20.1 Hz" in both and "gain -6.0 dB at 20.1 Hz" in both
+
+
+def test_a_band_that_ends_at_a_mode_of_the_specimen_is_limited_by_it_and_not_by_the_valves():
+    """The shear frame moves along x at 2.50 Hz; along y it is rigid, and at 5 Hz no mode is near."""
+    plant = make_plant(load_machine().with_specimen("shear_frame"))
+    first = specimen_modes(plant)[0].frequency
+    f = np.arange(1, 400) / 16.0
+    low = np.full((len(f), 1, 1), 0.63, complex)
+
+    def found(axis, end):
+        transfer = Transfer(f, low, np.ones((len(f), 1)), (axis,))
+        return bandwidth_limitation(plant, transfer, (0.0625, end), 3.0, 0.8, 33.0)
+
+    notch = found("x", 2.4375)
+    assert notch.by_specimen and notch.summary.endswith(f"near the specimen's mode 1 at {first:.3g} Hz")
+    assert "gain -4.0 dB at 2.5 Hz" in notch.summary and "valve delay" not in notch.summary
+    for other in (found("y", 2.4375), found("x", 4.9375)):
+        assert not other.by_specimen and "specimen" not in other.summary and "of valve delay" in other.summary
 
 
 def test_noise_has_the_level_and_the_band_it_says():

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..core.errors import ParameterError
-from ..machine.draft.asked import ASKED, option_of, read_answers
+from ..machine.draft.asked import ASKED, alternatives_of, option_of, read_answers, refuse_alternatives
 from ..machine.draft.cylinder import CYLINDERS
 from ..machine.structure import MOTIONS
 from .app import command, print_result, stderr
@@ -90,6 +90,7 @@ def new_machine(
     if path.exists() and not replace:
         raise ParameterError(f"{path}: exists already; choose another with --out, or add --replace")
     texts = answers.given()
+    refuse_alternatives(texts)
     if sys.stdin.isatty() and stderr().is_terminal and not json:
         motion, cylinder, voltage = ask(texts, motion, cylinder, voltage)
     machine = draft_machine(
@@ -159,12 +160,10 @@ def _matters(name: str, texts: dict[str, str], motion: str, cylinder: str) -> bo
     """Whether a number is still to be asked for, after the answers so far."""
     if ASKED[name].when and ASKED[name].when != motion:
         return False
-    if name == "bore":
-        return "area" not in texts
+    if any(other in texts for other in alternatives_of(name)):
+        return False
     if name == "rod":  # of a double-rod cylinder the area has no part of it
         return cylinder != CYLINDERS[0] or "area" not in texts
-    if name == "rated_flow":
-        return "speed" not in texts
     return name != "rated_drop" or "rated_flow" in texts
 
 

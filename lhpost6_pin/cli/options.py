@@ -61,7 +61,8 @@ Jobs = Annotated[int, _jobs("threads", "Threads; -1: all cores.")]
 Processes = Annotated[int, _jobs("processes", "Processes; -1: one a core.")]
 Beyond = Annotated[bool, typer.Option("--beyond-limits", help="Run a motion beyond the limits of the table.")]
 Valves = Annotated[
-    int, typer.Option(min=0, max=2, help="Open servovalves per horizontal actuator; 0: as in the machine file.")
+    int,
+    typer.Option(min=0, max=2, help="Open servovalves per horizontal actuator; 0: machine file (LHPOST6: 1 of 2)."),
 ]
 SensorsName = Annotated[
     str | None,

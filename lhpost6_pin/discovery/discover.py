@@ -50,7 +50,7 @@ __all__ = ["Discovery", "discover", "discovery_numbers"]
 FEWEST = 3  # tests that are searched; with more, one is held out
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Discovery(Shown):
     """Result of a search for missing effects."""
 

@@ -18,7 +18,7 @@ from .pose import kinematic_jacobian, leg_displacements
 from .rigid_body import platen_inertia
 
 __all__ = ["Capacity", "FlowReading", "capacity_table", "flow_readings", "has_printed_capacity", "payload_table"]
-__all__ += ["actuator_speeds", "axis_speeds", "axis_travel"]
+__all__ += ["actuator_speeds", "axis_speeds", "axis_travel", "with_all_valves"]
 
 ALL_VALVES = 2
 """Servovalves of a horizontal actuator of the LHPOST6, all open in Table 2.2."""
@@ -56,6 +56,11 @@ def has_printed_capacity(machine: Machine) -> bool:
     return "table_2_2.force_actuators" in machine.parameters
 
 
+def with_all_valves(machine: Machine) -> Machine:
+    """Return a copy with all servovalves open, as in Table 2.2; a machine whose file does not state it as it is."""
+    return machine.with_valves(ALL_VALVES if has_printed_capacity(machine) else 0)
+
+
 def capacity_table(machine: Machine, valves: int = 0) -> tuple[Capacity, ...]:
     """Peak forces, accelerations, velocities and strokes with what is mounted, beside what the machine file states.
 
@@ -64,7 +69,7 @@ def capacity_table(machine: Machine, valves: int = 0) -> tuple[Capacity, ...]:
     fewer servovalves than in Table 2.2, have nothing stated beside them.
     """
     plant, printed = lock_joints(make_plant(machine)), has_printed_capacity(machine)
-    open_valves = machine.with_valves(valves or (ALL_VALVES if printed else 0))
+    open_valves = machine.with_valves(valves) if valves else with_all_valves(machine)
     rows = [*_forces(plant), *_accelerations(plant), *_speeds(open_valves), *_travel(plant)]
     stated = _stated(machine)
     if printed and valves not in (0, ALL_VALVES):

@@ -24,7 +24,7 @@ from .report.calibrate_report import write_calibrate_report
 from .report.decompose_report import write_decompose_report
 from .report.discover_report import write_discover_report
 from .report.iterate_report import write_iterate_report
-from .report.page import summary_only
+from .report.page_summary import summary_only, summary_text
 from .report.run_report import write_run_report
 from .report.sine_report import write_sine_report
 from .report.tune_report import write_tune_report
@@ -32,7 +32,7 @@ from .report.validate_report import write_validate_report
 from .run_results import notes_of_run, run_remarks, write_test_report
 from .viewer import Picture
 
-__all__ = ["show_report", "show_summary"]
+__all__ = ["show_report", "show_summary", "show_text"]
 
 HEIGHT = 800  # in a notebook [CSS px]
 SUMMARY_HEIGHT = 420  # of a summary [CSS px]
@@ -50,6 +50,11 @@ def show_report(result: Any) -> Picture:
 def show_summary(result: Any) -> Picture:
     """Return the head of the report of a result: verdict, key figures and remarks. Raises as `show_report`."""
     return Picture(summary_only(_page(result)), SUMMARY_HEIGHT)
+
+
+def show_text(result: Any) -> str:
+    """Return the head of the report of a result as plain text of a few lines. Raises as `show_report`."""
+    return summary_text(_page(result))
 
 
 def _page(result: Any) -> str:

@@ -134,7 +134,10 @@ def tuning_entries(found: "Tuning") -> Entries:
     axes = {}
     for one in found.axes:
         chosen = {name: values[AXES.index(one.axis)] for name, values in _picked(found.after, *gains).items()}
-        axes[one.axis] = {**_picked(one, *names, "limited_by", "worse", "doubt"), "gains": chosen}
+        axes[one.axis] = {
+            **_picked(one, *names, "limited_by", "limited_by_specimen", "worse", "doubt"),
+            "gains": chosen,
+        }
     return {
         "tolerance_db": found.tolerance,
         "coherence": found.coherence,

@@ -16,6 +16,7 @@ from ..core.errors import OutOfRangeError
 from ..core.names import AXES
 from ..machine.strength import stated_strength
 from ..machine.structure import FLOW_READINGS
+from ..mechanics.capacity import with_all_valves
 from ..mechanics.motion_demands import make_motion_check
 from ..mechanics.plant import Plant, make_plant
 from ..mechanics.pose import PlatenMotion
@@ -30,8 +31,8 @@ def check_motion_limits(plant: Plant, target: Target, units: Units = SI) -> Limi
     """Demand of a target over the capacity of a plant, by limit, with texts in `units`.
 
     Raises OutOfRangeError that names each limit exceeded and the largest scale that fits; where the flow of valves is
-    exceeded, also the scale by the other reading of Eq. 4-2. For a guided machine also where the target moves an axis
-    that is not free.
+    exceeded, also the scale with all servovalves open and that by the other reading of Eq. 4-2. For a guided machine
+    also where the target moves an axis that is not free.
     """
     refuse_blocked_axes(plant, target)
     bounds = _axis_limits(plant)
@@ -40,9 +41,9 @@ def check_motion_limits(plant: Plant, target: Target, units: Units = SI) -> Limi
     except OutOfRangeError as error:
         if "actuator velocity" not in error.exceeded:
             raise
-        raise OutOfRangeError(
-            f"{error}{_by_other_reading(plant, target, error.largest_scale)}", error.largest_scale, error.exceeded
-        ) from None
+        least = error.largest_scale
+        ways = _with_more_valves(plant, target, least), _by_other_reading(plant, target, least)
+        raise OutOfRangeError(f"{error}{''.join(ways)}", least, error.exceeded) from None
 
 
 def refuse_blocked_axes(plant: Plant, target: Target) -> None:
@@ -117,6 +118,24 @@ def _axis_limits(plant: Plant) -> MotionLimits:
     rise = stated_strength(plant.machine.parameters).rise
     stated = six(limits.displacement), six(limits.velocity), six(limits.acceleration)
     return MotionLimits(*stated, rise if math.isfinite(rise) else None)
+
+
+def _with_more_valves(plant: Plant, target: Target, least: float | None) -> str:
+    """The scale that fits with all servovalves open, as a sentence; empty if they are, or it is not above `least`."""
+    machine = with_all_valves(plant.machine)
+    pairs = zip(plant.machine.actuators, machine.actuators, strict=True)
+    opened = [full for now, full in pairs if full.valves > now.valves]
+    if not opened:
+        return ""
+    fits = fitting_scale(make_plant(machine), target)
+    if least is not None and fits <= least:  # other limits govern
+        return ""
+    kind, count = opened[0].kind, opened[0].valves
+    every = "both servovalves" if count == 2 else f"all {count} servovalves"
+    return (
+        f". With {every} of each {kind} actuator open (--valves {count}, or {kind}.valves = {count} in an override) "
+        f"the largest scale is {fits:g}"
+    )
 
 
 def _by_other_reading(plant: Plant, target: Target, least: float | None) -> str:

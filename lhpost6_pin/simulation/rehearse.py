@@ -15,7 +15,7 @@ from ..core.arrays import Array
 from ..core.errors import SimulationError
 from ..core.names import SAMPLE_RATE
 from ..core.progress import Progress
-from ..core.shown import plot_of, summary_of
+from ..core.shown import hint_of, plot_of, summary_of, text_of
 from ..data.channels import LAYOUT
 from ..data.records import require
 from ..data.signals import resample_band_limited
@@ -45,6 +45,14 @@ class SimulatedTest(NamedTuple):
 
     def _repr_html_(self) -> str:
         return summary_of(self)
+
+    def __str__(self) -> str:
+        """Return the head of the report as text, as `text_of`."""
+        return text_of(self)
+
+    def __repr__(self) -> str:
+        """Return one line, as `hint_of`."""
+        return hint_of(self)
 
 
 def rehearse(

@@ -57,7 +57,7 @@ class Iteration(NamedTuple):
     clipped: int  # number of spool commands beyond their limit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Iterated(Shown):
     """History of an iteration, and its best drive."""
 

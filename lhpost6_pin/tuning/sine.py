@@ -60,7 +60,7 @@ class SineResult:
     peak_spool: float  # largest command [1]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SineTest(Shown):
     """A sine reproduced by the three-variable controller alone, and with APC and AHC."""
 

@@ -77,6 +77,7 @@ class AxisTuning:
     margin_after: Margin
     limited_by: str  # bandwidth limitation
     doubt: str = ""  # what in the run behind `after` was not linear: clipped commands, empty chambers
+    limited_by_specimen: bool = False  # whether the band ends near a mode of the specimen
 
     @property
     def worse(self) -> tuple[str, ...]:
@@ -103,7 +104,7 @@ def _finite(value: float, form: str, unit: str) -> str:
     return f"{value:{form}} {unit}" if np.isfinite(value) else "unlimited"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Tuning(Shown):
     """Result of a tuning: settings, the steps to them, and every axis before and after."""
 
@@ -151,9 +152,11 @@ def tune(machine: Machine, settings: ControllerSettings, *, progress: Progress |
         margin = old[0][a] if old else Margin(*(np.nan,) * 4)
         was, now = (band_within(t, 0, *limits) for t in (before, after))
         delay_was, delay_now = (delay_of(t, 0, 0, targets.low, targets.high) for t in (before, after))
-        reason = bandwidth_limitation(job.plant, after, now, *limits, targets.high)
-        axis = AXES[job.plant.axes[a]]
-        found.append(AxisTuning(axis, before, after, was, now, delay_was, delay_now, margin, new[a], reason, doubt))
+        reason, mode = bandwidth_limitation(job.plant, after, now, *limits, targets.high)
+        bands = before, after, was, now, delay_was, delay_now
+        found.append(
+            AxisTuning(AXES[job.plant.axes[a]], *bands, margin, new[a], reason, doubt, limited_by_specimen=mode)
+        )
     stable = stays_stable(machine, replace(tuned, master_gain=tuple(2.0 * g for g in tuned.master_gain)))
     job.done(12)
     return Tuning(

@@ -40,7 +40,7 @@ class Subset(NamedTuple):
     part: bool = True  # of all together; simulation is not
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Calibration(Shown):
     """Result of a calibration; p unknowns: parameters, then sensor errors."""
 

@@ -50,7 +50,7 @@ class ComparisonBand(NamedTuple):
     edge: float  # cut off at both ends [s]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Decomposed(Shown):
     """A decomposed record: `whole` has all samples in the sensors' band, `forces` and `motion` the compared ones."""
 

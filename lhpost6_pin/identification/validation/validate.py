@@ -45,7 +45,7 @@ _UNITS = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Validation(Shown):
     """Result of a validation: each phase of each test."""
 

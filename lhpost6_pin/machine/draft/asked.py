@@ -1,13 +1,13 @@
 """What `lhpost6 new-machine` asks of a table, in order: its prompts, its options and what is checked follow from it."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from ...core.errors import ParameterError
 from ..quantity import Quantity
 from .stated import read_stated
 
-__all__ = ["ASKED", "Asked", "option_of", "read_answers"]
+__all__ = ["ASKED", "Asked", "alternatives_of", "option_of", "read_answers", "refuse_alternatives"]
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,12 @@ ASKED: Mapping[str, Asked] = {
 }
 """By name; an option is the name with hyphens."""
 
+_ALTERNATIVES = (
+    ("area", "bore", "the piston's area", "if the bore was measured, else"),
+    ("speed", "rated_flow", "the flow of the valve", "if the valve's rated flow is known, else"),
+)
+"""Two names of numbers that determine the same quantity; that quantity, and when the first is to be left out."""
+
 
 def read_answers(texts: Mapping[str, str], voltage: float | None = None) -> dict[str, Quantity]:
     """Quantities of what was answered, by name, in SI; `voltage` [V] is the full command, for a speed per volt.
@@ -92,6 +98,20 @@ def read_answers(texts: Mapping[str, str], voltage: float | None = None) -> dict
     if "area" not in found and "bore" not in found:
         raise ParameterError("--area is missing: the piston area that the oil acts on, or --bore and --rod")
     return found
+
+
+def refuse_alternatives(names: Collection[str]) -> None:
+    """Raise ParameterError, naming both options, if two of these numbers determine the same quantity."""
+    for first, second, what, when in _ALTERNATIVES:
+        if first in names and second in names:
+            one, other = option_of(first), option_of(second)
+            raise ParameterError(f"{one} and {other} both determine {what}: leave out {one} {when} {other}")
+
+
+def alternatives_of(name: str) -> tuple[str, ...]:
+    """Names of the numbers that determine the same quantity as the number `name`."""
+    pairs = [(first, second) for first, second, *_ in _ALTERNATIVES if name in (first, second)]
+    return tuple(other for pair in pairs for other in pair if other != name)
 
 
 def option_of(name: str) -> str:

@@ -17,6 +17,7 @@ from ..machine import Machine, build_machine
 from ..parameters import Parameters, load_parameters
 from ..quantity import Quantity, Value
 from ..structure import MOTIONS
+from .asked import refuse_alternatives
 from .cylinder import CYLINDERS, cylinder_areas, cylinder_numbers
 from .legs import Leg, guided_legs, largest_travel, leg_rows, platform_legs
 from .typical import Basis, first, vector
@@ -34,11 +35,13 @@ def draft_machine(
 ) -> Machine:
     """Machine from quantities by the names of `asked.ASKED` (`slope`, `voltage`), as `asked.read_answers` reads them.
 
-    motion: the guided axes, or "free" for a platform on six legs. Raises ParameterError for what makes no machine.
+    motion: the guided axes, or "free" for a platform on six legs. Raises ParameterError for what makes no machine, and
+    for two numbers that determine the same quantity.
     """
     for word, given, valid in (("--motion", motion, MOTIONS), ("--cylinder", cylinder, CYLINDERS)):
         if given not in valid:
             raise ParameterError(f"{word} {given!r} is not one of {', '.join(valid)}")
+    refuse_alternatives({"speed" if key == "slope" else key for key in known})
     basis = Basis(known, load_parameters(models_folder() / "templates" / "new_machine.toml"))
     platen = _platen(basis, motion)
     oil = _oil(basis)

@@ -47,7 +47,6 @@ __all__ = [
     "render_page",
     "save_page",
     "shaded",
-    "summary_only",
     "text",
     "versions",
 ]
@@ -303,13 +302,6 @@ def render_page(page: Page) -> str:
         f'<script type="application/octet-stream" id="library">{packed_plotly()}</script>\n'
         f"<script>{beside('page.js')}</script>\n</body>\n</html>\n"
     )
-
-
-def summary_only(page: str) -> str:
-    """The page of a report as text (`render_page`) cut after its summary, without navigation and script."""
-    head, rest = page.split("<body>", 1)
-    summary = rest[rest.index("<header>") : rest.index("</header>")]
-    return f"{head}<body>\n<main>{summary}</header></main>\n</body></html>\n"
 
 
 def save_page(page: Page, path: Path | str) -> Path:

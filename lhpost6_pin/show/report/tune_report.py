@@ -10,7 +10,7 @@ from .page import Block, Headline, Level, Page, Section, Table, bullet_list, gri
 from .scales import decibels, degrees, milliseconds
 from .tune_plots import bode_figure, overview_figure
 
-__all__ = ["losses", "measuring_doubts", "tuning_tables", "write_tune_report"]
+__all__ = ["losses", "measuring_doubts", "specimen_limits", "tuning_tables", "write_tune_report"]
 
 # Judgement, not physics: the band in which every axis must follow its reference, and the margin it must keep.
 FOLLOWED = (0.1, 20.0)  # [Hz]
@@ -68,6 +68,7 @@ def _verdict(tuning: Tuning) -> tuple[str, Level]:
         if low
         else f"The gain margin of every axis is at least {GAIN_MARGIN:g} dB.",
         f"The loop is {'stable' if tuning.doubled else 'unstable'} with all master gains doubled.",
+        *specimen_limits(tuning),
         *losses(tuning),
         *measuring_doubts(tuning),
     ]
@@ -80,6 +81,17 @@ def _verdict(tuning: Tuning) -> tuple[str, Level]:
 def losses(tuning: Tuning) -> list[str]:
     """Sentences on axes that are worse with the settings found than with those before."""
     return [f"Worse than before in {axis.axis}: {'; '.join(axis.worse)}." for axis in tuning.axes if axis.worse]
+
+
+def specimen_limits(tuning: Tuning) -> list[str]:
+    """A sentence on axes that do not follow to the end because of a mode of the specimen, and what corrects them."""
+    axes = [axis.axis for axis in tuning.axes if axis.limited_by_specimen and not _follows(axis)]
+    if not axes:
+        return []
+    return [
+        f"In {', '.join(axes)} the band ends near a mode of the specimen, whose notch these gains do not correct: "
+        "iterate the drive of each motion (`lhpost6 iterate`)."
+    ]
 
 
 def measuring_doubts(tuning: Tuning) -> list[str]:

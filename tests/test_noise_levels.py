@@ -7,13 +7,18 @@ import numpy as np
 import pytest
 import xarray as xr
 from commands import refused
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from machine_cases import PRACTICE
 from sensor_cases import with_change
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.data.campaign_check import check_campaign
 from lhpost6_pin.data.check import check_dataset
 from lhpost6_pin.data.consistency import check_sensors
+from lhpost6_pin.data.fusion import fuse_motion
+from lhpost6_pin.data.layout_faults import FASTEST, SLOWEST
 from lhpost6_pin.data.measured_sensors import compare_noise, find_sensors, measured_sensors, save_sensors
 from lhpost6_pin.data.noise_levels import noise_levels
 from lhpost6_pin.data.observable import observable
@@ -360,3 +365,33 @@ def test_without_rests_or_sensors_a_command_says_what_to_run(lhpost6, tmp_path):
         assert refused(ended, "uniaxial names no sensors file", "lhpost6 check c --machine uniaxial --sensors-out")
     assert refused(lhpost6("check", "c", "--machine", "uniaxial", "--sensors-out", "own.toml"), "not written", "rest")
     assert not Path("own.toml").exists()
+
+
+# Sampling rates -------------------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=40, deadline=None, derandomize=True, database=None)
+@given(exponent=st.floats(np.log10(SLOWEST), np.log10(FASTEST)), samples=st.integers(2, 600))
+@example(exponent=-1.0, samples=2)  # the spline and the parabola of fused motion had fewer points than coefficients
+@example(exponent=-1.0, samples=400)  # no sample in a segment of a spectrum
+@example(exponent=0.0, samples=60)  # none in a window of the noise
+@example(exponent=np.log10(25.0), samples=5)  # no time between the edges of filters
+@example(exponent=np.log10(5.9), samples=2)
+def test_records_of_any_sampling_rate_and_length_are_judged_without_a_crash(exponent, samples):
+    rate = float(f"{10**exponent:.6g}")
+    rng = np.random.default_rng(samples)
+    t = np.arange(samples) / np.clip(rate, 1.001 * SLOWEST, 0.999 * FASTEST)
+    x, a = np.zeros((2, samples, 6))
+    x[:, 0], a[:, 0] = 1e-3 * rng.standard_normal((2, samples))
+    channels = {"platen_displacement": x, "actuator_displacement": x[:, :1], "platen_acceleration": a}
+    channels |= {"pressure_difference": 1e5 * rng.standard_normal((samples, 1))}
+    record = make_record(t, channels, TABLE.labels, {"kind": "measured", "test": "logger"})
+    levels = noise_levels([record])
+    if 0.8 * rate / 2 <= 6.0:  # the band that is read ends below its lowest frequency
+        assert not levels.channels
+    warned = [f.message for f in check_dataset(record, TABLE) if f.channel == "time" and f.severity == "warning"]
+    assert len(warned) == (not 200 <= 1 / sample_interval(record) <= 1e5)
+    check_campaign(TABLE, [record])
+    check_campaign(TABLE, [record], "lhpost6")
+    fused = fuse_motion(PLANT, record, load_sensors())
+    assert np.isfinite(fused.motion.displacement).all()

@@ -3,11 +3,13 @@
 from concurrent.futures import Executor, Future
 from queue import SimpleQueue
 
+import numpy as np
 import pytest
 from panel_table import Table
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import ControllerError
+from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.panel import session as session_module
 from lhpost6_pin.panel.client import Client
 from lhpost6_pin.panel.link_state import link_state
@@ -247,19 +249,22 @@ def ends(panel):
 def test_the_end_of_every_program_is_in_the_journal_with_its_cause(panel):
     running(panel)
     panel.pass_time(4.0)
-    # the clock takes 2 s to its rate and 2 s to rest, in which it runs on by one: 3.0 s of its own, as the page shows
-    assert ends(panel) == ["program: sine 1 Hz ended after 3.0 s: by itself"]
+    # two cycles take 3 s, since its clock takes 2 s to its rate, and 2 s to rest: the time in which the reference moves
+    speed = np.abs(panel.table.of("reference_velocity")[:, 0])
+    moving = np.ptp(np.flatnonzero(speed > 0.02 * speed.max())) / SAMPLE_RATE  # faster than the return to the setpoint
+    assert moving == pytest.approx(5.0, abs=0.6)  # its first and last quarter of a second are slower than that
+    assert ends(panel) == ["program: sine 1 Hz ended after 5.0 s: by itself"]
     running(panel, cycles=None)
     panel.take({"do": "stop"})
     panel.session.look()
     assert len(ends(panel)) == 1  # it returns to the setpoint first
     panel.pass_time(5.0)
-    assert ends(panel)[1:] == ["program: sine 1 Hz ended after 3.0 s: stopped by Anna"]
+    assert ends(panel)[1:] == ["program: sine 1 Hz ended after 5.0 s: stopped by Anna"]
     running(panel, cycles=None)
     panel.take({"do": "trip"})
     panel.session.look()
     panel.pass_time(0.1)
-    assert ends(panel)[2:] == ["program: sine 1 Hz ended after 2.0 s: the table tripped"]
+    assert ends(panel)[2:] == ["program: sine 1 Hz ended after 3.0 s: the table tripped"]
     panel.pass_time(1.0)
     assert len(ends(panel)) == 3
 

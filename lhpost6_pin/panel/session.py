@@ -253,7 +253,7 @@ class Session:
         rows = self._ring.read()
         if len(rows):
             self.time.add(rows)
-            self._end_of_program.pass_time(float(self.layout.of(rows, "program_time").max()))
+            self._end_of_program.pass_samples(rows[:, 0], self.layout.of(rows, "program_time")[:, 0])
         if (ended := self._end_of_program.take()) is not None:
             self.journal.note("program", ended)
         if self.recording is not None:

@@ -30,6 +30,7 @@ from lhpost6_pin.data.turned_signs import turned_signs
 from lhpost6_pin.machine.components import Floor
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import kinematic_jacobian
 from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.tuning.sine import sine_target
 
@@ -274,6 +275,23 @@ def test_a_force_with_its_sign_turned_is_found_and_no_other(column):
     moves = column < 4  # a test along x: the vertical actuators hold, and nothing can be said of them
     expected = [f"actuator_force[{machine.actuator_names[column]}]"] * moves
     assert [f.channel for f in turned_signs(turned, machine)] == expected
+
+
+def test_two_forces_that_are_exchanged_are_not_stated_to_be_turned_for_sure():
+    machine, record = load_machine(), load_record(PRACTICE)
+    facing = kinematic_jacobian(make_plant(machine))[:4, 0]  # elongation per motion along x: H1 and H2 face H3 and H4
+    other = int(np.argmin(facing * facing[0]))
+    order = np.arange(10)
+    order[[0, other]] = other, 0
+    (exchanged,) = with_change([record], "actuator_force", lambda x: x[:, order])
+    found = {f.channel: f.remedy for f in turned_signs(exchanged, machine)}
+    first, second = machine.actuator_names[0], machine.actuator_names[other]
+    assert set(found) == {f"actuator_force[{first}]", f"actuator_force[{second}]"}
+    for own, its in ((first, second), (second, first)):
+        assert found[f"actuator_force[{own}]"].startswith(f"its sign is turned, or it is exchanged with {its}: ")
+    signs = np.where(np.arange(10) == 0, -1.0, 1.0)
+    (turned,) = with_change([record], "actuator_force", lambda x: x * signs)
+    assert "exchanged" not in turned_signs(turned, machine)[0].remedy
 
 
 @pytest.mark.parametrize(("axis", "amplitude", "column"), [("x", 0.1, 1), ("z", 0.05, 4)])

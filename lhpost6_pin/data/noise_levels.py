@@ -3,8 +3,8 @@
 A level is the median over frequency of an averaged periodogram, so that lines of hum leave it as it is, and drift and
 settling below its lowest frequency do so as well. The part that the digital resolution makes, which `sensors.spectrum`
 adds for each record, is taken off. Without a rest the least level at which the spectrum of the quietest windows is flat
-stands in, an upper bound; where it is flat nowhere, or only at the level of the resolution, the noise is hidden. A record
-whose sampling rate leaves no band above that lowest frequency shows none.
+stands in, an upper bound; where it is flat nowhere, or only at the level of the resolution, the noise is hidden. A
+record whose sampling rate leaves no band above that lowest frequency shows none.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -7,13 +7,18 @@ import numpy as np
 import pytest
 import xarray as xr
 from commands import refused
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from machine_cases import PRACTICE
 from sensor_cases import with_change
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.data.campaign_check import check_campaign
 from lhpost6_pin.data.check import check_dataset
 from lhpost6_pin.data.consistency import check_sensors
+from lhpost6_pin.data.fusion import fuse_motion
+from lhpost6_pin.data.layout_faults import FASTEST, SLOWEST
 from lhpost6_pin.data.measured_sensors import compare_noise, find_sensors, measured_sensors, save_sensors
 from lhpost6_pin.data.noise_levels import noise_levels
 from lhpost6_pin.data.observable import observable
@@ -25,6 +30,7 @@ from lhpost6_pin.data.turned_signs import turned_signs
 from lhpost6_pin.machine.components import Floor
 from lhpost6_pin.machine.machine import Machine, load_machine
 from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.mechanics.pose import kinematic_jacobian
 from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.tuning.sine import sine_target
 
@@ -271,6 +277,23 @@ def test_a_force_with_its_sign_turned_is_found_and_no_other(column):
     assert [f.channel for f in turned_signs(turned, machine)] == expected
 
 
+def test_two_forces_that_are_exchanged_are_not_stated_to_be_turned_for_sure():
+    machine, record = load_machine(), load_record(PRACTICE)
+    facing = kinematic_jacobian(make_plant(machine))[:4, 0]  # elongation per motion along x: H1 and H2 face H3 and H4
+    other = int(np.argmin(facing * facing[0]))
+    order = np.arange(10)
+    order[[0, other]] = other, 0
+    (exchanged,) = with_change([record], "actuator_force", lambda x: x[:, order])
+    found = {f.channel: f.remedy for f in turned_signs(exchanged, machine)}
+    first, second = machine.actuator_names[0], machine.actuator_names[other]
+    assert set(found) == {f"actuator_force[{first}]", f"actuator_force[{second}]"}
+    for own, its in ((first, second), (second, first)):
+        assert found[f"actuator_force[{own}]"].startswith(f"its sign is turned, or it is exchanged with {its}: ")
+    signs = np.where(np.arange(10) == 0, -1.0, 1.0)
+    (turned,) = with_change([record], "actuator_force", lambda x: x * signs)
+    assert "exchanged" not in turned_signs(turned, machine)[0].remedy
+
+
 @pytest.mark.parametrize(("axis", "amplitude", "column"), [("x", 0.1, 1), ("z", 0.05, 4)])
 def test_a_turned_force_is_found_in_a_slow_sine_in_which_friction_hides_inertia(axis, amplitude, column):
     machine = load_machine()
@@ -360,3 +383,33 @@ def test_without_rests_or_sensors_a_command_says_what_to_run(lhpost6, tmp_path):
         assert refused(ended, "uniaxial names no sensors file", "lhpost6 check c --machine uniaxial --sensors-out")
     assert refused(lhpost6("check", "c", "--machine", "uniaxial", "--sensors-out", "own.toml"), "not written", "rest")
     assert not Path("own.toml").exists()
+
+
+# Sampling rates -------------------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=40, deadline=None, derandomize=True, database=None)
+@given(exponent=st.floats(np.log10(SLOWEST), np.log10(FASTEST)), samples=st.integers(2, 600))
+@example(exponent=-1.0, samples=2)  # the spline and the parabola of fused motion had fewer points than coefficients
+@example(exponent=-1.0, samples=400)  # no sample in a segment of a spectrum
+@example(exponent=0.0, samples=60)  # none in a window of the noise
+@example(exponent=np.log10(25.0), samples=5)  # no time between the edges of filters
+@example(exponent=np.log10(5.9), samples=2)
+def test_records_of_any_sampling_rate_and_length_are_judged_without_a_crash(exponent, samples):
+    rate = float(f"{10**exponent:.6g}")
+    rng = np.random.default_rng(samples)
+    t = np.arange(samples) / np.clip(rate, 1.001 * SLOWEST, 0.999 * FASTEST)
+    x, a = np.zeros((2, samples, 6))
+    x[:, 0], a[:, 0] = 1e-3 * rng.standard_normal((2, samples))
+    channels = {"platen_displacement": x, "actuator_displacement": x[:, :1], "platen_acceleration": a}
+    channels |= {"pressure_difference": 1e5 * rng.standard_normal((samples, 1))}
+    record = make_record(t, channels, TABLE.labels, {"kind": "measured", "test": "logger"})
+    levels = noise_levels([record])
+    if 0.8 * rate / 2 <= 6.0:  # the band that is read ends below its lowest frequency
+        assert not levels.channels
+    warned = [f.message for f in check_dataset(record, TABLE) if f.channel == "time" and f.severity == "warning"]
+    assert len(warned) == (not 200 <= 1 / sample_interval(record) <= 1e5)
+    check_campaign(TABLE, [record])
+    check_campaign(TABLE, [record], "lhpost6")
+    fused = fuse_motion(PLANT, record, load_sensors())
+    assert np.isfinite(fused.motion.displacement).all()

@@ -3,14 +3,20 @@
 from concurrent.futures import Executor, Future
 from queue import SimpleQueue
 
+import numpy as np
 import pytest
 from panel_table import Table
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import ControllerError
+from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.data.check import check_dataset
+from lhpost6_pin.data.records import load_record
+from lhpost6_pin.interfaces.link import PlantState
 from lhpost6_pin.panel import session as session_module
 from lhpost6_pin.panel.client import Client
 from lhpost6_pin.panel.link_state import link_state
+from lhpost6_pin.panel.recording import Recording
 from lhpost6_pin.panel.ring import Ring
 from lhpost6_pin.panel.session import Options, Session
 from lhpost6_pin.panel.timekeeping import Timekeeping
@@ -247,19 +253,22 @@ def ends(panel):
 def test_the_end_of_every_program_is_in_the_journal_with_its_cause(panel):
     running(panel)
     panel.pass_time(4.0)
-    # the clock takes 2 s to its rate and 2 s to rest, in which it runs on by one: 3.0 s of its own, as the page shows
-    assert ends(panel) == ["program: sine 1 Hz ended after 3.0 s: by itself"]
+    # two cycles take 3 s, since its clock takes 2 s to its rate, and 2 s to rest: the time in which the reference moves
+    speed = np.abs(panel.table.of("reference_velocity")[:, 0])
+    moving = np.ptp(np.flatnonzero(speed > 0.02 * speed.max())) / SAMPLE_RATE  # faster than the return to the setpoint
+    assert moving == pytest.approx(5.0, abs=0.6)  # its first and last quarter of a second are slower than that
+    assert ends(panel) == ["program: sine 1 Hz ended after 5.0 s: by itself"]
     running(panel, cycles=None)
     panel.take({"do": "stop"})
     panel.session.look()
     assert len(ends(panel)) == 1  # it returns to the setpoint first
     panel.pass_time(5.0)
-    assert ends(panel)[1:] == ["program: sine 1 Hz ended after 3.0 s: stopped by Anna"]
+    assert ends(panel)[1:] == ["program: sine 1 Hz ended after 5.0 s: stopped by Anna"]
     running(panel, cycles=None)
     panel.take({"do": "trip"})
     panel.session.look()
     panel.pass_time(0.1)
-    assert ends(panel)[2:] == ["program: sine 1 Hz ended after 2.0 s: the table tripped"]
+    assert ends(panel)[2:] == ["program: sine 1 Hz ended after 3.0 s: the table tripped"]
     panel.pass_time(1.0)
     assert len(ends(panel)) == 3
 
@@ -318,6 +327,45 @@ def test_a_recording_is_listed_at_once_as_one_that_is_being_written(panel):
     assert panel.session.recording.name == "long-2"
     panel.work.release()
     assert panel.session.writing == [] and panel.session.recordings[0].endswith("long.nc")
+
+
+def test_the_record_of_a_trip_states_it_in_its_own_time_also_after_a_reset(panel):
+    running(panel, cycles=None)
+    panel.take({"do": "record", "on": True, "name": "tripped"})
+    panel.pass_time(0.5)
+    panel.take({"do": "trip"})
+    panel.session.look()
+    panel.pass_time(1.0)
+    panel.take({"do": "reset"})
+    panel.session.look()
+    assert not panel.state.trip
+    panel.pass_time(0.5)
+    panel.take({"do": "record", "on": False}, {"do": "record", "on": True, "name": "sound"})
+    panel.pass_time(0.5)
+    panel.take({"do": "record", "on": False})
+    panel.work.release()
+    record, sound = map(load_record, panel.session.recordings)
+    assert record.attrs["trouble"] == "tripped at 0.500 s: by Anna" and sound.attrs["trouble"] == "none"
+    held = np.flatnonzero(record["plant_state"].values == PlantState.HOLD)
+    assert 0.5 * SAMPLE_RATE <= held[0] <= 0.5 * SAMPLE_RATE + 6  # within five samples
+    warned = [str(f) for f in check_dataset(record) if f.severity == "warning" and not f.channel]
+    assert warned == ["tripped at 0.500 s: by Anna (what follows is not the test's)"]
+
+
+def test_a_recording_counts_trips_before_it_began_and_none_of_another_session(machine):
+    rows = np.zeros((2000, rows_of(machine).width))
+    rows[:, 0] = np.r_[500:2000, 0:500]
+    recording = Recording("long")
+    assert recording.trouble is None
+    recording.trip(400, "force of H1 at 104.0 % of capacity, limit 100 %, at 0.195 s")
+    recording.add(rows[:1500])
+    why = "force of H1 at 104.0 % of capacity, limit 100 %"
+    assert recording.trouble == f"tripped before the recording began: {why}"
+    recording.trip(1524, "by Anna, at 0.744 s")
+    assert recording.trouble == f"tripped before the recording began: {why}; 2 trips in all"
+    recording.add(rows[1500:])
+    recording.trip(499, "by Anna, at 0.244 s")
+    assert recording.trouble == f"tripped before the recording began: {why}; 2 trips in all"
 
 
 @pytest.mark.parametrize(

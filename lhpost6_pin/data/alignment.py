@@ -66,6 +66,8 @@ def phase_delay(reference: ArrayLike, signal: ArrayLike, dt: float, band: Band =
 
     ref, sig = (np.asarray(x, dtype=float).reshape(len(np.asarray(x)), -1) for x in (reference, signal))
     length = min(len(ref), round(SEGMENT / dt))
+    if length < 2:  # too slow a record to resolve any frequency
+        return np.zeros(ref.shape[1]), np.full(ref.shape[1], np.inf)
     each = {"fs": 1 / dt, "nperseg": length, "axis": 0}
     f, cross = sp.csd(ref, sig, **each)
     power = sp.welch(ref, **each)[1] * sp.welch(sig, **each)[1]

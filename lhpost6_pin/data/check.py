@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from ..core.arrays import Array
+from ..core.arrays import Array, Mask
 from ..core.errors import RecordError
 from ..core.names import AXES
 from ..machine.machine import Machine
@@ -26,6 +26,7 @@ from .layout_faults import RecordFinding, layout_faults
 from .mass_regression import mass_fits
 from .records import open_record, sample_interval
 from .rests import rest_numbers
+from .served_samples import judged_samples, served_findings
 from .signals import differentiate, lowpass_zero_phase
 from .turned_signs import turned_signs
 
@@ -81,9 +82,11 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
     if "time" in broken or not known:
         return errors + contents  # signals cannot be judged on a broken time axis
     sound = dataset[[*known]].astype(float).assign_attrs(dataset.attrs)
-    columns = tuple(c for c in _columns(sound, known) if not _held(c, machine))
+    judged = judged_samples(dataset)
+    columns = tuple(c for c in _columns(sound, known, judged) if not _held(c, machine))
     by_column = (_implausible_unit, _starts_in_motion, _saturated_spool, _frozen, _spike)
     warnings = chain(
+        served_findings(dataset),
         (warning for judge in by_column for c in columns if (warning := judge(c))),
         _odd_rates(sound),
         _inconsistent_motion(sound),
@@ -153,6 +156,7 @@ class _Column(NamedTuple):
     x: Array  # (n,)
     span: float
     measured: bool
+    judged: Mask  # (n,) samples that show a sensor
 
     @property
     def is_command(self) -> bool:
@@ -160,14 +164,14 @@ class _Column(NamedTuple):
         return LAYOUT[self.channel.split("[")[0]].role == "command"
 
 
-def _columns(dataset: xr.Dataset, names: Iterable[str]) -> Iterator[_Column]:
+def _columns(dataset: xr.Dataset, names: Iterable[str], judged: Mask) -> Iterator[_Column]:
     measured = dataset.attrs.get("kind") == "measured"
     for variable in (dataset[name] for name in names if name in dataset):
         values = columns_of(variable)
         spans = np.ptp(values, axis=0)
         for k, x in enumerate(values.T):
             alike = spans[3 * (k // 3) :][:3] if "axis" in variable.dims else spans
-            yield _Column(channel_name(variable, k), x, float(max(alike.max(), 1e-6 * spans.max())), measured)
+            yield _Column(channel_name(variable, k), x, float(max(alike.max(), 1e-6 * spans.max())), measured, judged)
 
 
 def _held(c: _Column, machine: Machine | None) -> bool:
@@ -214,7 +218,8 @@ def _frozen(c: _Column) -> _Warning | None:
     lengths = np.diff(starts, append=len(x))
     moved = max(RESOLUTION_STEPS * resolution(x), STILL * c.span)
     extreme = (x[starts] == x.max()) | (x[starts] == x.min())
-    for k in np.flatnonzero(lengths >= np.maximum(np.where(extreme, 4, 8), 5 * np.median(lengths))):
+    shown = np.add.reduceat(c.judged.astype(int), starts)  # samples of each run in which a sensor shows
+    for k in np.flatnonzero(shown >= np.maximum(np.where(extreme, 4, 8), 5 * np.median(lengths))):
         start, count = int(starts[k]), int(lengths[k])
         before = np.abs(np.diff(x[max(start - 4, 0) : start]))
         if start > 0 and len(before) and np.mean(before) > moved:
@@ -235,6 +240,8 @@ def _spike(c: _Column) -> _Warning | None:
     beside = maximum_filter1d(np.stack([np.roll(size, s) for s in (-10, 10)]), 13, axis=1).max(axis=0)
     least = max(SPIKE_NOISE * 1.4826 * np.median(size), RESOLUTION_STEPS * resolution(c.x), STILL * c.span)
     for k in np.flatnonzero(((size > 4 * beside) & (size > least))[3:-3]) + 3:
+        if not c.judged[k - 3 : k + 4].all():
+            continue
         alone = rough[k] * taps  # the response to a lone sample; that to a step or a kink differs
         if np.sum((rough[k - 3 : k + 4] - alone) ** 2) < 0.01 * np.sum(alone**2):
             return c.channel, int(k), f"is {rough[k]:+.4g} off its neighbours for one sample", "interpolate it"
@@ -251,7 +258,8 @@ def _odd_rates(dataset: xr.Dataset) -> Iterator[_Warning]:
         yield "time", None, what, "record faster, or check the unit of time"
     if count < 256:
         return
-    for channel, x, span, _ in _columns(dataset, ("platen_acceleration", "actuator_force")):
+    every = np.ones(count, bool)
+    for channel, x, span, *_ in _columns(dataset, ("platen_acceleration", "actuator_force"), every):
         f, power = welch(x - x.mean(), rate, nperseg=256)
         top = float(power[f > 0.4 * rate].sum() / power.sum()) if power.sum() > 0 else 0.0
         if top > 0.05 and np.ptp(x) > max(0.05 * span, 100 * resolution(x)):
@@ -292,6 +300,8 @@ def _coherent_gain(expected: Array, found: Array, dt: float) -> float | None:
     from scipy.signal import csd, welch
 
     each = {"fs": 1 / dt, "nperseg": int(min(len(found) // 4, round(2 / dt)))}
+    if each["nperseg"] < 10:
+        return None  # no five frequencies above zero
     f, cross = csd(expected, found, **each)
     ours, theirs = welch(expected, **each)[1], welch(found, **each)[1]
     band = (f > 0) & (f < 20) & (ours > 1e-4 * ours.max()) & (np.abs(cross) ** 2 > 0.95 * ours * theirs)

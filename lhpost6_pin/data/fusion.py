@@ -196,7 +196,7 @@ def _weighted(differences: list[tuple[Array, Array]], f: Array, dt: float) -> Pl
     basis = np.stack([np.ones(n), t / t[-1], (t / t[-1]) ** 2], axis=1)
     spectra, slow = np.zeros((len(f), 6), complex), np.zeros((3, 6))
     for difference, weight in differences:
-        parabola = np.linalg.solve(basis.T @ basis, basis.T @ difference)
+        parabola = np.linalg.lstsq(basis, difference, rcond=None)[0]  # the least one through two samples
         rest = difference - basis @ parabola
         middle, half = (rest[-1] + rest[0]) / 2, (rest[-1] - rest[0]) / 2
         rest = rest - middle - np.outer(basis[:, 1], half)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from ..core.arrays import Array
+from ..core.arrays import Array, Mask
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters
 from ..mechanics.plant import make_plant
@@ -35,6 +35,7 @@ class MassFit(NamedTuple):
     explained: float  # share of the force's squares that mass and friction explain
     by_mass: float  # share that mass alone explains
     power: float  # mean square of friction's power, signed: below zero where it drives the motion
+    opposite: tuple[str, ...]  # actuators along which this record's acceleration is the opposite
     given: float  # mean power to the platen over rms force, about its mean, and rms speed: -1 to 1, at all frequencies
 
 
@@ -52,6 +53,7 @@ def mass_fits(record: xr.Dataset, machine: Machine, numbers: Parameters) -> list
     band, rows = Band(low, high), kinematic_jacobian(make_plant(machine))
     speed, along = (x @ rows.T for x in _platen_motion(record, high, dt))  # (n, actuators)
     size = np.std(along, axis=0)
+    opposite = _opposite(along, size, numbers.number("sign.opposite"))
     moving = size >= max(numbers.number("sign.moving") * size.max(), 1e-300)
     found = []
     for name, label, force in _forces(record, machine):
@@ -68,7 +70,8 @@ def mass_fits(record: xr.Dataset, machine: Machine, numbers: Parameters) -> list
             power = float(np.sum(x[:, 1:] @ coefficient[1:] * x[:, 2]))
             share = float(coefficient[0]) / _mass_moved(machine, rows, i)
             given = _mean_power(force, speed[:, i])
-            found.append(MassFit(f"{name}[{label}]", label, share, explained, by_mass, power, given))
+            others = tuple(machine.actuator_names[j] for j in np.flatnonzero(opposite[i]))
+            found.append(MassFit(f"{name}[{label}]", label, share, explained, by_mass, power, others, given))
     return found
 
 
@@ -80,6 +83,12 @@ def _platen_motion(record: xr.Dataset, high: float, dt: float) -> tuple[Array, A
         return speed, differentiate(speed, dt)
     acceleration = Band(high=high).apply(record["platen_acceleration"].values.astype(float), dt)
     return integrate(acceleration - acceleration.mean(axis=0), dt)[0], acceleration
+
+
+def _opposite(along: Array, size: Array, least: float) -> Mask:
+    """Pairs of actuators (n, n) whose accelerations (samples, n) correlate by -`least` or less."""
+    unit = (along - along.mean(axis=0)) / np.maximum(size, 1e-300)
+    return np.asarray(unit.T @ unit / len(along) <= -least)
 
 
 def _mean_power(force: Array, speed: Array) -> float:

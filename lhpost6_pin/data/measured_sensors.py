@@ -144,7 +144,8 @@ def measured_sensors(
     if levels.hidden:
         raise RecordError(f"no rest, and tests in motion hide the noise of {', '.join(levels.hidden)}")
     if not levels.channels:
-        raise RecordError("no channel shows any noise; a simulated record without noise needs no sensors file")
+        why = f"no channel shows any noise at {levels.rate:g} Hz, the rate of the records"
+        raise RecordError(f"{why}: it is too slow, or they are simulated without noise and need no sensors file")
     found = {f"sampling.{key}": quantity for key, quantity in _sampling(levels, numbers).items()}
     for name, one in levels.channels.items():
         six = "axis" in LAYOUT[name].dims

@@ -3,7 +3,8 @@
 A level is the median over frequency of an averaged periodogram, so that lines of hum leave it as it is, and drift and
 settling below its lowest frequency do so as well. The part that the digital resolution makes, which `sensors.spectrum`
 adds for each record, is taken off. Without a rest the least level at which the spectrum of the quietest windows is flat
-stands in, an upper bound; where it is flat nowhere, or only at the level of the resolution, the noise is hidden.
+stands in, an upper bound; where it is flat nowhere, or only at the level of the resolution, the noise is hidden. A
+record whose sampling rate leaves no band above that lowest frequency shows none.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -85,7 +86,7 @@ def noise_levels(records: Sequence[xr.Dataset], numbers: Parameters | None = Non
     """Noise of every measured channel of a campaign, and of valve commands, which are recorded as voltages.
 
     A platen acceleration that was computed from accelerometers is none. Channels that carry no
-    noise at all are omitted.
+    noise at all are omitted; so are records too slow to show any.
     """
     numbers = numbers or rest_numbers()
     rests = find_rests(records, numbers)
@@ -95,6 +96,8 @@ def noise_levels(records: Sequence[xr.Dataset], numbers: Parameters | None = Non
         rests, seconds = [(slice(0, r.sizes["time"]),) for r in records], 0.0
     pools: dict[str, _Pool] = {}
     for record, slices in zip(records, rests, strict=True):
+        if not _resolved(record, numbers):
+            continue
         for name, pool in _channels(record, pools):
             _add(pool, record, name, slices, numbers)
     rates = [float(f"{1 / sample_interval(record):.6g}") for record in records]
@@ -124,6 +127,11 @@ def noise_levels(records: Sequence[xr.Dataset], numbers: Parameters | None = Non
     each = zip(records, rests, strict=True)
     tests = tuple(str(r.attrs.get("test", f"record {k + 1}")) for k, (r, slices) in enumerate(each) if slices)
     return NoiseLevels(rate, band, seconds, tests, channels, tuple(n for n in spectra if n not in flat))
+
+
+def _resolved(record: xr.Dataset, numbers: Parameters) -> bool:
+    """Whether a record's rate leaves a band in which noise is read: above drift, below the end of its spectrum."""
+    return numbers.number("spectrum.highest") * 0.5 / sample_interval(record) > numbers.number("spectrum.lowest")
 
 
 def _channels(record: xr.Dataset, pools: dict[str, _Pool]) -> Iterator[tuple[str, _Pool]]:
@@ -236,6 +244,8 @@ def _flat_band(
     found = []
     for low in np.arange(numbers.number("spectrum.plateau"), nyquist - width, 0.25 * width):
         parts = [varying[(f >= low + k * width / 3) & (f <= low + (k + 1) * width / 3)] for k in range(3)]
+        if not all(len(part) for part in parts):
+            continue  # thirds of such a band are narrower than a window resolves
         levels = np.array([np.median(part, axis=0) for part in parts])
         if (levels.max(axis=0) <= most * levels.min(axis=0)).all() and (levels > 2 * quantum).all():
             found.append((float(np.mean(np.log(levels))), float(low)))

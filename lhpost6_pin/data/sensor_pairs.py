@@ -162,7 +162,7 @@ def _lengths(view: RecordView) -> Iterator[SensorComparison]:
         terms = _gain_terms(due[:, i], rate[:, i], (noise[0][i], noise[1][i]))
         terms.append(Regressor("drift", "m/s", 0.0, time, 0.0, beside=True))
         errors = [gain_l * due[:, i], offset_l * one, delay_l * rate[:, i], delay_x * rate[:, i]]
-        errors.append(np.sqrt(variance[i]) * time / max(time[-1] - time[0], view.dt))
+        errors.append(np.sqrt(variance[i]) * time / (view.step * view.dt * max(len(time) - 1, 1)))
         errors += [jacobian[i, k] * (gain_x * slow[:, k] + offset_x) for k in range(6)]
         errors += [change[:, i] for change in geometry]
         check, channel = "length against platen pose", f"actuator_displacement[{name}]"

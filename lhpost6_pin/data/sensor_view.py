@@ -59,7 +59,8 @@ class RecordView:
         self.dt = sample_interval(record)
         self.step = max(1, int(1 / (8 * BAND.high * self.dt)))
         self.trim = round(TRIM / (self.step * self.dt))
-        self.independent = 2 * BAND.high * (len(time) * self.dt - 2 * TRIM)
+        left = len(range(0, len(time), self.step)) - 2 * self.trim  # samples; no more than these are independent
+        self.independent = max(1.0, min(2 * BAND.high * (len(time) * self.dt - 2 * TRIM), left))
         self.f = np.linspace(0.0, min(0.5 / self.dt, 4 * BAND.high), 1025)
 
     def has(self, *names: str) -> bool:

@@ -208,7 +208,7 @@ def differentiate(x: ArrayLike, dt: float, cutoff: float | None = None, order: i
         low_pass = 1.0 if cutoff is None else 1 / (1 + (f / cutoff) ** order)
         return (2j * np.pi * f * low_pass).reshape(-1, *[1] * (x.ndim - 1))
 
-    return _filtered(x, dt, response, keep_chord=False) + (x[-1] - x[0]) / ((len(x) - 1) * dt)
+    return _filtered(x, dt, response, keep_chord=False) + (x[-1] - x[0]) / (max(len(x) - 1, 1) * dt)
 
 
 def resample_band_limited(x: ArrayLike, t_old: ArrayLike, t_new: ArrayLike, half_width: int = 24) -> Array:

@@ -3,9 +3,10 @@
 Where the regression of a force on the motion (`mass_regression`) explains it with the coefficients of mass and friction
 negative, its sign is turned. So it is where inertia is small beside friction, as in a slow sine, and the actuator takes
 energy from the platen throughout: friction and dampers only dissipate, and springs give back what they took.
+Two such forces along which the motion is opposite may as well be exchanged: the record does not distinguish these.
 """
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 import xarray as xr
 
@@ -17,6 +18,10 @@ from .rests import rest_numbers
 __all__ = ["turned_signs"]
 
 _REMEDY = "its sign is turned: write sign = -1 in the channel map, and import again"
+_EITHER = (
+    "its sign is turned, or it is exchanged with {}: write sign = -1 in the channel map, or exchange both there, "
+    "and import again"
+)
 
 
 def turned_signs(record: xr.Dataset, machine: Machine, fits: Sequence[MassFit] | None = None) -> list[RecordFinding]:
@@ -25,15 +30,24 @@ def turned_signs(record: xr.Dataset, machine: Machine, fits: Sequence[MassFit] |
     A record of another machine, without motion, or slower than the band compared has none. `fits` are the record's
     `mass_fits`, if they are known.
     """
-    numbers, found = rest_numbers(), []
+    numbers = rest_numbers()
+    found: list[tuple[MassFit, str]] = []
     least, most = numbers.vector("sign.share")
     low, high = numbers.vector("sign.band")
     for fit in mass_fits(record, machine, numbers) if fits is None else fits:
         firm = fit.explained >= numbers.number("sign.explained")
         if firm and least <= -fit.share <= most and fit.power < 0:
             what = f"opposes the motion that it causes, mass and friction alike, from {low:g} to {high:g} Hz"
-            found.append(RecordFinding("error", fit.channel, None, what, _REMEDY))
+            found.append((fit, what))
         elif fit.by_mass < numbers.number("sign.explained") and fit.given <= -numbers.number("sign.taken"):
             what = f"takes energy from the platen throughout (power over apparent power {fit.given:.2f})"
-            found.append(RecordFinding("error", fit.channel, None, what, _REMEDY))
-    return found
+            found.append((fit, what))
+    turned = {fit.channel for fit, _ in found}
+    return [RecordFinding("error", fit.channel, None, what, _remedy(fit, turned)) for fit, what in found]
+
+
+def _remedy(fit: MassFit, turned: Set[str]) -> str:
+    """What to do about a turned force; all channels that are turned."""
+    name = fit.channel.partition("[")[0]
+    others = [other for other in fit.opposite if f"{name}[{other}]" in turned]
+    return _EITHER.format(" or ".join(others)) if others else _REMEDY

@@ -47,6 +47,7 @@ class Status(NamedTuple):
     on: tuple[bool, ...]
     where: tuple[str, ...]
     number: int = 0  # of the choice that loaded the program
+    tripped_at: int = 0  # sample of the trip, if any
 
 
 class Engine:
@@ -71,7 +72,7 @@ class Engine:
         self._speed[self._speed == 0.0] = np.inf
         self._tolerance = numbers.number("raised.tolerance") * max(limits.displacement[2], 1e-3)
         self._reference = Reference(Drive(numbers, self._speed, np.zeros(6)), self._controller.drive_for)
-        self.pressure, self.trip = "low", ""
+        self.pressure, self.trip, self._tripped_at = "low", "", 0
         self._number = 0
         self._place, self._lifted, self._state = "raised", True, PlantState.WAITING
         self._memory = self._controller.init()
@@ -117,7 +118,7 @@ class Engine:
     def trip_by(self, reason: str) -> None:
         """Stop commanding, and end the program; the first reason stays."""
         if not self.trip and self.pressure == "high":
-            self.trip = reason
+            self.trip, self._tripped_at = reason, self._last
             self._reference.changed()
             self._drive.take_over(self._now.displacement, self._last)
 
@@ -273,6 +274,7 @@ class Engine:
             tuple(map(bool, look.on)),
             tuple(look.where(i) for i in range(len(INTERLOCKS))),
             self._number,
+            self._tripped_at,
         )
 
     def _fill(self, reading: Reading, wanted: Moved | None) -> None:

@@ -12,6 +12,7 @@ from ..core.arrays import Array
 from ..core.errors import ControllerError, LhpostError
 from ..data.records import save_record
 from ..data.sensors import SensorSet
+from ..data.served_samples import ANSWERED, PLANT_STATE
 from ..simulation.simulated_campaign import SensorErrors, as_sensed
 from .choice import Choice
 from .client import Client
@@ -204,6 +205,8 @@ class Session:
                 raise ControllerError("a recording runs already; end it first")
             pressed(self.status)
             self.recording = Recording(self._free_name(name))
+            if self.status is not None and self.status.trip:
+                self.recording.trip(self.status.tripped_at, self.status.trip)
             self.journal.note(client.name, f"begins the recording {self.recording.name}")
         elif self.recording is not None:
             done, self.recording = self.recording, None
@@ -221,12 +224,12 @@ class Session:
     def _save(self, recording: Recording) -> str:
         status = self.status
         facts = {**self._facts, "test": recording.name, "title": recording.name}
-        facts |= {"scale": status.scale if status else 1.0, "trouble": (status and status.trip) or "none"}
+        facts |= {"scale": status.scale if status else 1.0, "trouble": recording.trouble or "none"}
         record = record_of_rows(recording.rows(), self.layout, self.machine, facts)
         if self._options.sensors is not None:
             rate, rng = self._numbers.number("recording.rate"), np.random.default_rng()
             errors = SensorErrors({}, {}, {})
-            record = as_sensed(record.drop_vars("answered"), self._options.sensors, errors, rate, rng)
+            record = as_sensed(record.drop_vars([ANSWERED, PLANT_STATE]), self._options.sensors, errors, rate, rng)
         path = self._folder / f"{recording.name}.nc"
         save_record(record, path, single=True)
         self.recordings.append(str(path))
@@ -253,7 +256,7 @@ class Session:
         rows = self._ring.read()
         if len(rows):
             self.time.add(rows)
-            self._end_of_program.pass_time(float(self.layout.of(rows, "program_time").max()))
+            self._end_of_program.pass_samples(rows[:, 0], self.layout.of(rows, "program_time")[:, 0])
         if (ended := self._end_of_program.take()) is not None:
             self.journal.note("program", ended)
         if self.recording is not None:
@@ -274,6 +277,8 @@ class Session:
         if kind == "status":
             if content.trip and (self.status is None or not self.status.trip):
                 self.journal.note("interlock", f"trip: {content.trip}")
+                if self.recording is not None:
+                    self.recording.trip(content.tripped_at, content.trip)
             self.status, self.link = content, "on"
             self._end_of_program.show(content)
         elif kind == "done":

@@ -1,0 +1,47 @@
+"""Samples of a recording of a served plant that show no sensor: unanswered ones, and those of its safe hold.
+
+A sample that the controller did not answer repeats the row before it, in all channels. In its safe hold, as after a
+trip, the plant moves its valves by itself, to where they stay.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+
+from ..core.arrays import Mask
+
+__all__ = ["ANSWERED", "PLANT_STATE", "SAFE_HOLD", "judged_samples", "served_findings"]
+
+ANSWERED, PLANT_STATE = "answered", "plant_state"
+"""Channels of such a recording: whether the controller answered a sample, and the state of the plant."""
+
+SAFE_HOLD = 2  # state, as `interfaces.link.PlantState`
+
+
+def judged_samples(dataset: xr.Dataset) -> Mask:
+    """Samples (n,) that sensors are judged by: answered, and not of a safe hold; all where a record states neither."""
+    return _answered(dataset) & (_row(dataset, PLANT_STATE, 0) != SAFE_HOLD)
+
+
+def served_findings(dataset: xr.Dataset) -> Iterator[tuple[str, int | None, str, str]]:
+    """Channel, sample, message and remedy: unanswered samples, and what the record states as its trouble."""
+    missed = ~_answered(dataset)
+    if missed.any():
+        count = int(missed.sum())
+        what = f"{count} sample{'s'[: count != 1]} without an answer of the controller (`{ANSWERED}`)"
+        yield "", int(missed.argmax()), what, "all channels repeat the sample before"
+    trouble = str(dataset.attrs.get("trouble", "none"))
+    if trouble not in ("none", ""):
+        yield "", None, trouble, "what follows is not the test's"
+
+
+def _answered(dataset: xr.Dataset) -> Mask:
+    return np.asarray(_row(dataset, ANSWERED, 1) != 0)
+
+
+def _row(dataset: xr.Dataset, name: str, usual: int) -> np.ndarray:
+    """A channel (n,) of numbers; the usual one where the record has none."""
+    if name in dataset and dataset[name].dims == ("time",) and dataset[name].dtype.kind in "biuf":
+        return np.asarray(dataset[name].values)
+    return np.full(dataset.sizes["time"], usual)

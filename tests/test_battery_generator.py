@@ -37,6 +37,7 @@ def lively(random: np.random.Generator) -> np.ndarray:
     return y
 
 
+@pytest.mark.slow
 def test_the_table_at_rest_has_the_pressures_of_the_reports_machine():
     y, spool = simulate.at_rest(*nominal())
     # model.md's static equilibrium, closed form: zero horizontal force, leakage fed by the spool; four digits are given
@@ -143,6 +144,7 @@ def test_a_variety_changes_nothing_else_of_a_case(variety):
     assert bool(other.left_out) is variety.fewer
 
 
+@pytest.mark.slow
 def test_a_table_drawn_anew_is_known_to_its_lab_and_follows_its_motions(tmp_path):
     """With no more error than the nominal table's tenth of the stroke, and its valves short of their limit."""
     nominal = cases.model()

@@ -970,6 +970,7 @@ def test_the_simplest_is_named_first_only_where_it_is_hardly_behind():
     )  # what noise alone decides
 
 
+@pytest.mark.slow
 def test_the_floor_is_noise_and_what_warmer_oil_leaves(found, rubbing, sensors):
     search, held = found.search, [r for r in rubbing.records if r.attrs["test"] == "TZ"]
     machine, records = model_at(search.solution.normal.problem, search.solution.x, held)

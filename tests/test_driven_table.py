@@ -278,6 +278,7 @@ def sine(axis: int = 0, frequency: float = 0.5):
     return make_wave("sine", axes=(axis,), frequency=frequency, **GENERATOR)
 
 
+@pytest.mark.slow
 def test_a_wave_over_the_link_is_that_in_one_process_whatever_the_controller_s_delay(table, machine):
     """At nine tenths of real time, and by a controller that stalls: motion and rows are the same to the last bit."""
     table.do("span", axis=0, value=0.1)

@@ -56,6 +56,13 @@ def test_white_noise_has_no_factor_but_that_of_few_draws():
     assert few.mean() < 1.2 and few.max() < 2.0  # of eight, within 25 %
 
 
+def test_what_no_residual_depends_on_keeps_its_prior():
+    rng = np.random.default_rng(3)
+    slope = np.column_stack([rng.standard_normal(50), np.zeros(50)])
+    draws = rng.standard_normal((8, 50))
+    assert deviations(equations(slope, draws[0], [], draws))[1] == pytest.approx(1.0)
+
+
 def test_noise_in_the_derivatives_widens_the_interval():
     """Estimates by corrected equations scatter as predicted; a deviation of 1500 runs is known within 2 %."""
     rng, n, runs, size = np.random.default_rng(2), 300, 1500, 0.4

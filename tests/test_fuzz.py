@@ -414,7 +414,12 @@ def wire(answers: list[bytes]) -> mock.Mock:
     def send(datagram: bytes) -> None:
         found.queue = [answer[:12] + datagram[12:16] + answer[16:] for answer in answers]
 
-    found.send, found.recv = send, lambda size: found.queue.pop(0)[:size]
+    def receive(size: int) -> bytes:
+        if not found.queue:
+            raise BlockingIOError
+        return found.queue.pop(0)[:size]
+
+    found.send, found.recv = send, receive
     found.fileno.return_value = 3
     return found
 

@@ -64,6 +64,7 @@ def chamber_energy(pressure: np.ndarray, volume: np.ndarray, bulk: float) -> np.
     return volume * (bulk * np.expm1(pressure / bulk) - pressure)
 
 
+@pytest.mark.slow
 def test_steady_velocity_at_a_constant_opening_is_that_of_the_closed_form():
     table, opening = PLAIN._replace(leakage=0.0, viscous=6000.0, chamber_a=2.0, chamber_b=2.0), 0.3
     run = driven(table, np.full(round(2.5 * RATE), opening))

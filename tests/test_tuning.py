@@ -124,6 +124,7 @@ def test_a_panel_with_velocity_and_acceleration_feedback_is_fitted_exactly():
     np.testing.assert_allclose(fit.plant, plant, rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["lhpost6", "untuned"])
 def test_a_light_specimen_costs_no_axis_its_displacement_gain(start):
     """0.7 t on the platen's 257 t: neither Kx nor KF of roll can be raised alone, and both can.

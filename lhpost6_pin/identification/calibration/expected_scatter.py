@@ -35,7 +35,9 @@ def scatter_factor(normal: NormalEquations, x: Array) -> Array:
     draws = zip(*normal.problem.noise_draws(x), strict=True)
     steps = np.array([inverse @ normal.right_side(draw) for draw in draws])
     expected = np.diag(inverse @ (matrix + noise) @ inverse)
-    return np.asarray(np.sqrt(np.maximum(1.0, np.mean(steps**2, axis=0) / expected)))
+    seen = np.mean(steps**2, axis=0)
+    ratio = np.divide(seen, expected, out=np.ones(len(seen)), where=expected > 0.0)  # zero: in no residual
+    return np.asarray(np.sqrt(np.maximum(1.0, ratio)))
 
 
 def covariance_of_estimate(normal: NormalEquations, factor: Array) -> Array:

@@ -1,10 +1,10 @@
-"""All checks of the project: lint, format, types, tests, two batteries of sealed cases. Exit code 0 only if all pass.
+"""All checks of the project: lint, format, types, tests, a battery of sealed cases. Exit code 0 only if all pass.
 
     python scripts/checks.py [--fast | --slow]
 
---fast leaves out the batteries and all tests marked `long`: under two minutes, between two edits. --slow runs the long
-studies that the ordinary run leaves out, and builds the documentation site. The batteries are of a few brief cases,
-made anew.
+--fast leaves out the battery and all tests marked `long`: under two minutes, between two edits. --slow runs the long
+studies that the ordinary run leaves out, builds the documentation site, and searches a battery of one-axis tables. A
+battery has a few brief cases, made anew.
 """
 
 import os
@@ -21,7 +21,7 @@ BATTERY = ["scripts/blind_battery.py", "--cases", "3", "--brief", "--seed", "901
 """One that lacks nothing, one with one effect, and one with two."""
 
 ONE_AXIS = ["scripts/one_axis_battery.py", "--cases", "4", "--brief", "--seed", "7", "--check"]
-"""Two that lack nothing, one with each effect."""
+"""Two that lack nothing, one with each effect; with the slow tests."""
 
 COMPILE = """
 import sys
@@ -51,19 +51,10 @@ def main() -> int:
         failed = [name for name, command in checks.items() if not _passes(name, command)]
         list(beside.map(_compile, COMPILED, [f"{folder}/{k}" for k in range(len(COMPILED))]))  # until both have ended
         failed += ["tests"] * (not _passes("tests", [*TESTS, *chosen]))
-        if not fast and not slow:
-            # beside each other: the last case of one does not leave a core alone
-            jobs = ["--jobs", str(os.cpu_count() or 1)]
-            commands = {
-                name: [*battery, *jobs, "--out", f"{folder}/{name}"]
-                for name, battery in (("battery", BATTERY), ("one-axis battery", ONE_AXIS))
-            }
-            caught: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
-            running = {name: beside.submit(_run, command, **caught) for name, command in commands.items()}
-            for name, command in commands.items():
-                ended = running[name].result()
-                print(f"== {name}: {' '.join(command)}\n{ended.stdout}", end="", flush=True)
-                failed += [name] * (ended.returncode != 0)
+        if not fast:
+            name, battery = ("one-axis battery", ONE_AXIS) if slow else ("battery", BATTERY)
+            command = [*battery, "--jobs", str(os.cpu_count() or 1), "--out", f"{folder}/battery"]
+            failed += [name] * (not _passes(name, command))
         print(f"== types: -m mypy\n{types.result().stdout}", end="", flush=True)
         failed += ["types"] * (types.result().returncode != 0)
     print(f"failed: {', '.join(failed)}" if failed else "all checks passed", flush=True)

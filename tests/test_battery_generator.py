@@ -48,6 +48,7 @@ def test_the_table_at_rest_has_the_pressures_of_the_reports_machine():
     assert spool[4] == pytest.approx(1.91e-4, rel=3e-3)
 
 
+@pytest.mark.slow
 def test_the_platen_rings_on_its_oil_columns_at_the_known_frequencies():
     legs, platen = nominal()
     legs["seal"] = legs["pad"] = legs["viscous"] = legs["leakage"] = 0.0

@@ -394,6 +394,7 @@ def test_the_surprise_of_what_is_left_falls_as_least_squares_over_its_power():
     assert less == pytest.approx(0.7 * counts.sum())  # less than noise is noise
 
 
+@pytest.mark.slow
 def test_slopes_of_twins_keep_up_with_what_they_share(machine, sensors, seen):
     """After a frugal search that has moved what twins share, their slopes still add up to that of it."""
     ready = Problem(machine, seen[:1], seen[1:], sensors, COMPARISON, again=[seen[1:2]])

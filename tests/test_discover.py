@@ -924,6 +924,7 @@ def test_the_gap_of_a_held_out_test_that_does_not_feel_the_effect_stays_at_the_n
         assert gap.after == pytest.approx(other, rel=0.08)  # parameters that share the search's noise
 
 
+@pytest.mark.slow
 def test_shares_are_of_the_error_that_each_effect_removes(found, machine, rubbing, sensors):
     """Of two effects, one is there and the other is not; of one alone, the model without it is the refit."""
     search, test = found.search, [r for r in rubbing.records if r.attrs["test"] == "TX"]
@@ -1095,6 +1096,7 @@ def test_an_effect_made_by_hand_is_in_no_machine_file_and_one_taken_out_leaves_t
         more.without_effect("c")
 
 
+@pytest.mark.slow
 def test_the_next_test_tells_apart_what_it_excites(machine, sensors):
     """Breakaway friction explained by itself, and by more viscosity, in strokes of a few millimetres."""
     names = ("H1", "H2", "H3", "H4")

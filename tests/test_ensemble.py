@@ -283,6 +283,7 @@ def test_every_run_is_the_rehearsal_of_its_machine(sines):
         assert str(own["failure"].values) == "" and str(own["trouble"].values) == ""
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_an_interrupted_ensemble_goes_on_to_the_same_file(sines, tmp_path):
     made, path = sines

@@ -76,6 +76,7 @@ def test_steady_velocity_at_a_constant_opening_is_that_of_the_closed_form():
     assert run.y[-1, PA] + run.y[-1, PB] == pytest.approx(table.supply + table.back, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_an_overlapped_spool_off_its_null_opens_by_what_is_left():
     table = PLAIN._replace(leakage=0.0, viscous=6000.0, chamber_a=2.0, chamber_b=2.0)
     plain = driven(table, np.full(round(2.5 * RATE), 0.3))

@@ -529,7 +529,7 @@ def test_groups_of_residuals_agree_as_chance_allows_where_nothing_is_wrong(machi
     whole = simulate_campaign(machine, load_controller("lhpost6"), sensors, seed=0)
     null = calibrate(machine, whole.records, sensors)
     apart = [one for one in contradictions(null) if one.subset != "simulation"]
-    assert sum(compared(null).values()) > 300 and chance(null) < 1.0
+    assert sum(compared(null).values()) > 250 and chance(null) < 1.0
     assert len(apart) <= 4, apart  # chance makes five or more of one expected in 0.4 % of campaigns
     assert all(abs(one.deviations) < 5.0 for one in apart)
 

@@ -152,7 +152,7 @@ def test_shares_of_valves_and_strokes_are_rates_over_speeds_and_elongations_over
     limits = plant_limits(plant)  # of what was achieved, by reports and ensembles: feedback has had its reserve
     np.testing.assert_array_equal(limits["actuator_extending"], actuator_speeds(plant)[:, 0])
     np.testing.assert_array_equal(limits["actuator_retracting"], actuator_speeds(plant)[:, 1])
-    after = {demand.quantity: demand for demand in make_motion_check(plant, achieved=True)(still, velocity, still)}
+    after = {demand.quantity: demand for demand in check(still, velocity, still, achieved=True)}
     np.testing.assert_allclose(after["actuator velocity"].share, 0.85 * share, rtol=1e-12)  # of the reserve of 15 %
     assert "reserve" not in after["actuator velocity"].of
     assert share[0, 4] == pytest.approx(0.1 / speeds[4, 0])

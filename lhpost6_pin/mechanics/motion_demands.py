@@ -7,26 +7,38 @@ strength: reaction mass, platen, tilt of the pistons, payload. Beside them the r
 over the capacity along this axis alone, which does not decide: axes share the actuators.
 """
 
+from typing import Protocol
+
 import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import OutOfRangeError
 from ..core.names import AXES
 from ..machine.strength import Strength, stated_strength
-from ..motions import Demand, MotionCheck
+from ..motions import Demand
 from .actuator_forces import axis_capacity, force_range, required_forces, rest_forces, wrench_at_bearings
 from .equilibrium import actuator_speeds, rest_remedy
 from .plant import Plant
 from .pose import PlatenMotion, leg_displacements, rotation
 from .specimen_joints import specimen_mass
 
-__all__ = ["make_motion_check"]
+__all__ = ["DemandCheck", "make_motion_check"]
 
 OVERTURNING = ("roll", "pitch")
 OF_SPEED = "of the unloaded velocity of its valves"
 
 
-def make_motion_check(plant: Plant, *, achieved: bool = False) -> MotionCheck:
+class DemandCheck(Protocol):
+    """A `MotionCheck`, also of motion that was achieved."""
+
+    def __call__(
+        self, displacement: Array, velocity: Array, acceleration: Array, *, achieved: bool = False
+    ) -> list[Demand]:
+        """Demands of a motion, (n, 6) each."""
+        ...
+
+
+def make_motion_check(plant: Plant) -> DemandCheck:
     """Return the demands of a motion (displacement, velocity, acceleration of C and Euler angles, (n, 6) each).
 
     Valves can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load. In a
@@ -34,15 +46,16 @@ def make_motion_check(plant: Plant, *, achieved: bool = False) -> MotionCheck:
     Raises SimulationError or OutOfRangeError if the actuators cannot hold what is mounted at rest.
     """
     machine = plant.machine
-    reserve = 0.0 if achieved else machine.limits.valve_reserve
-    speeds, of_speed = (1.0 - reserve) * actuator_speeds(plant), f"{OF_SPEED} less the reserve of {100 * reserve:g} %"
+    full = actuator_speeds(plant)
     strokes, names = np.array([a.stroke for a in machine.actuators]), machine.actuator_names
     strength, rest = stated_strength(machine.parameters), rest_forces(plant)
     _refuse_unheld(plant, rest.share[0])
     along, span = axis_capacity(plant), force_range(plant)
     single = np.array([a.area_b is None for a in machine.actuators])
 
-    def check(displacement: Array, velocity: Array, acceleration: Array) -> list[Demand]:
+    def check(displacement: Array, velocity: Array, acceleration: Array, *, achieved: bool = False) -> list[Demand]:
+        reserve = 0.0 if achieved else machine.limits.valve_reserve
+        speeds, of_speed = (1.0 - reserve) * full, f"{OF_SPEED} less the reserve of {100 * reserve:g} %"
         legs, rate = leg_displacements(plant, displacement, velocity)
         moved, rate = legs[:, : plant.spools], rate[:, : plant.spools]
         fed = np.where(rate >= 0.0, rate / speeds[:, 0], -rate / speeds[:, 1])

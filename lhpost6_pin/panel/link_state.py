@@ -27,10 +27,7 @@ def link_state(word: str, time: Timekeeping, server: str, own: bool, numbers: Pa
     holds = f"{time.holds} safe hold{'' if time.holds == 1 else 's'}"
     title = f"Server {server}: {time.answered} samples, {100.0 * late:.3f} % of them late, {holds}"
     if slow:
-        remedy = (
-            f"{_SLOW}, or start the panel with --pace 0.5. Motion and recordings are not affected" if own else _SLOW
-        )
-        title = f"{title}. {remedy}."
+        title = f"{title}. {_SLOW}{_PACE if own else ''}."
     return {
         "ok": word == "on",
         "word": word,

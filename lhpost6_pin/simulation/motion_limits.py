@@ -6,6 +6,7 @@ with the specimen mounted, strengths. The comparison and the largest scale that 
 """
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -80,9 +81,9 @@ def judge_motion(plant: Plant, motion: PlatenMotion, target: Target | None = Non
 
     Of these the flow of the valves is what they can feed; for the scale at which the target fits, less the reserve.
     """
-    bounds = _axis_limits(plant)
-    fits = None if target is None else largest_scale(target, bounds, make_motion_check(plant))
-    return Judgement(limit_peaks(motion, bounds, make_motion_check(plant, achieved=True)), fits)
+    bounds, check = _axis_limits(plant), make_motion_check(plant)
+    fits = None if target is None else largest_scale(target, bounds, check)
+    return Judgement(limit_peaks(motion, bounds, partial(check, achieved=True)), fits)
 
 
 def judge_record(plant: Plant, record: xr.Dataset, *, fits: bool = True) -> Judgement | None:

@@ -26,9 +26,10 @@ from lhpost6_pin.identification.calibration.expected_scatter import noise_at
 from lhpost6_pin.identification.calibration.fit import solve
 from lhpost6_pin.identification.calibration.free_parameters import FreeParameter, plan_parameters, scatter_parameters
 from lhpost6_pin.identification.calibration.normal_equations import bounded_step, bounds_of
+from lhpost6_pin.identification.calibration.operating_point import OperatingPoint
 from lhpost6_pin.identification.calibration.override import save_override
 from lhpost6_pin.identification.calibration.prepare import policy_of
-from lhpost6_pin.identification.calibration.problem import OperatingPoint, Problem, ResidualBands
+from lhpost6_pin.identification.calibration.problem import Problem, ResidualBands
 from lhpost6_pin.identification.calibration.result import contradictions
 from lhpost6_pin.identification.calibration.sensor_errors import corrected, corrected_record, sensor_unknowns
 from lhpost6_pin.identification.calibration.simulated_residuals import by_simulation
@@ -303,7 +304,7 @@ def test_errors_of_chambers_b_are_taken_out_where_spools_were_not_measured(probl
 
 
 # --------------------------------------------------------------------------------------------------------- fit
-COMPARISON = ResidualBands((0.0, 0.01, 5.0, 10.0, 20.0, 30.0), 0.3, 0.1)
+COMPARISON = ResidualBands((0.0, 0.01, 5.0, 10.0, 20.0, 30.0), 0.3, 0.1, 0.5)
 
 
 @pytest.fixture(scope="module")
@@ -365,7 +366,8 @@ def test_softer_oil_makes_more_noise_in_flows_alone(problem, seen):
     assert np.all(now[bands][:, flow] > stiff[bands][:, flow])
     assert np.all(now[bands][:, flow] < (factor + 1e-6) * stiff[bands][:, flow])
     assert np.all(now[-1][flow] > (1.0 + 0.6 * (factor - 1.0)) * stiff[-1][flow])
-    assert np.allclose(now[bands][:, wrench], stiff[bands][:, wrench], rtol=1e-9)  # rounding
+    # of the wrench it is the same, but for friction's states at the start, which noise common to flows and forces shows
+    assert np.allclose(now[bands][:, wrench], stiff[bands][:, wrench], rtol=1e-3)
 
 
 def test_whitened_bins_scale_with_the_whitener(problem):

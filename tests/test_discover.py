@@ -73,8 +73,9 @@ from lhpost6_pin.identification.calibration import calibration_numbers, fit
 from lhpost6_pin.identification.calibration.bin_rows import BinRows, dense_rows, row_by_column
 from lhpost6_pin.identification.calibration.fit import objective_at, solve
 from lhpost6_pin.identification.calibration.normal_equations import bounded_step, bounds_of
+from lhpost6_pin.identification.calibration.operating_point import OperatingPoint
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
-from lhpost6_pin.identification.calibration.problem import OperatingPoint, Problem
+from lhpost6_pin.identification.calibration.problem import Problem
 from lhpost6_pin.identification.calibration.sensor_errors import corrected_record
 from lhpost6_pin.identification.inverse_dynamics import leg_wrenches
 from lhpost6_pin.identification.validation import validate
@@ -181,7 +182,7 @@ def test_columns_evaluated_together_are_the_derivatives_of_each_alone(ready, fam
             size[i] = shape.typical
             plant = make_plant(one.on(problem.machine, tuple(size.tolist())))
             change, _ = problem.change(base, plant, one.family.shows_in)
-            direct = problem.whitener.apply(0, change[..., None], problem.frequency[0])[..., 0] / shape.typical
+            direct = problem.whitened(0, change[..., None])[..., 0] / shape.typical
             # forward dynamics and its inverse, and a quieted path marched with other states beside it: rounding
             row = row_by_column(direct, np.ones(direct.shape))
             np.testing.assert_allclose(columns.times(part[:, i]), row, rtol=0.0, atol=1e-6 * np.abs(row).max())
@@ -920,8 +921,9 @@ def test_the_gap_of_a_held_out_test_that_does_not_feel_the_effect_stays_at_the_n
     """A vertical triangle hardly moves the horizontal seals."""
     assert (found.used, found.held_out) == (("TX", "WN"), ("TZ",))
     (gap,) = found.proof.gaps
-    for other in (gap.refitted, gap.delivered):  # the machine as delivered is right about what this test feels
-        assert gap.after == pytest.approx(other, rel=0.08)  # parameters that share the search's noise
+    # the machine as delivered is right about what this test feels; parameters share the search's noise
+    assert gap.after == pytest.approx(gap.delivered, rel=0.08)
+    assert gap.after < 1.08 * gap.refitted  # whose parameters are moved by what the effect does elsewhere
 
 
 @pytest.mark.slow

@@ -24,8 +24,8 @@ from lhpost6_pin.identification.calibration.calibration_summary import convergen
 from lhpost6_pin.identification.calibration.fit import misfit, solve
 from lhpost6_pin.identification.calibration.friction_forms import _Force, compare_friction, effect_of_form, own_suffices
 from lhpost6_pin.identification.calibration.normal_equations import bounded_step
+from lhpost6_pin.identification.calibration.operating_point import OperatingPoint
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
-from lhpost6_pin.identification.calibration.problem import OperatingPoint
 from lhpost6_pin.identification.decompose import decompose_record, find_agreement
 from lhpost6_pin.identification.validation import validate
 from lhpost6_pin.identification.validation.prepare_tests import validation_numbers

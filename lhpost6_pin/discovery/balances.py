@@ -15,7 +15,8 @@ import numpy as np
 from ..core.arrays import Array, Complex, Mask
 from ..identification.calibration.fit import Solution
 from ..identification.calibration.measured_wrench import measured_bins
-from ..identification.calibration.problem import OperatingPoint, Problem
+from ..identification.calibration.operating_point import OperatingPoint
+from ..identification.calibration.problem import Problem
 from ..identification.calibration.whitened_residuals import mean_squares, negative_log_likelihood
 
 __all__ = ["Balance", "HeldOut", "evaluate_balances", "gain_on", "residual_at"]

@@ -12,7 +12,8 @@ import numpy as np
 from ..core.arrays import Array, Complex
 from ..effects.registry import LAWS
 from ..identification.calibration.bin_rows import BinRows, dense_rows
-from ..identification.calibration.problem import OperatingPoint, Problem
+from ..identification.calibration.operating_point import OperatingPoint
+from ..identification.calibration.problem import Problem
 from ..identification.inverse_dynamics import with_loads
 from ..identification.prepare import actuator_forces
 from ..identification.residual_kernels import row_wrenches
@@ -47,8 +48,7 @@ def columns_of_groups(
 
 def whitened_rows(problem: Problem, bins: Sequence[Complex]) -> list[BinRows]:
     """Rows, whitened as residuals are, of bins (m, c, k) of every test."""
-    pairs = enumerate(zip(bins, problem.frequency, strict=True))
-    return [dense_rows(problem.whitener.apply(t, own, f)) for t, (own, f) in pairs]
+    return [dense_rows(problem.whitened(t, own)) for t, own in enumerate(bins)]
 
 
 def _bins_of(

@@ -185,7 +185,6 @@ def _prepared(
         *(machine, records, sensors, calibration),
         kinds=RESIDUALS,
         others=lambda m: (with_other_form(m, n("scatter.form")), with_warm_oil(m, n("scatter.drift"))),
-        preload=n("scatter.preload"),
         seed=seed,
         jobs=jobs,
     )

@@ -14,7 +14,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.names import AXES
 from ..data.signals import Band
-from ..identification.calibration.problem import OperatingPoint
+from ..identification.calibration.operating_point import OperatingPoint
 from ..identification.prepare import MeasuredTest
 from ..identification.residual_change import Evaluated, change_of
 from ..identification.residuals import RESIDUALS, Path, follow, kinds_shown

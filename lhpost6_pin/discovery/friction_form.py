@@ -18,7 +18,8 @@ from ..core.progress import Progress, between, split
 from ..identification.calibration.fit import solve
 from ..identification.calibration.friction_forms import compare_friction, effect_of_form, own_suffices
 from ..identification.calibration.normal_equations import bounds_of
-from ..identification.calibration.problem import OperatingPoint, Problem
+from ..identification.calibration.operating_point import OperatingPoint
+from ..identification.calibration.problem import Problem
 from ..machine.library import find_family, in_size_of
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters

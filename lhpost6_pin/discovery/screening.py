@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..core.progress import Progress
-from ..identification.calibration.problem import OperatingPoint, Problem
+from ..identification.calibration.operating_point import OperatingPoint
+from ..identification.calibration.problem import Problem
 from .acceptance import Lowered, Reweighting, gate, refusal
 from .candidate_columns import columns_of_groups
 from .candidates import Candidate, list_candidates, list_releases

@@ -14,7 +14,8 @@ from ..identification.calibration.expected_scatter import covariance_of_estimate
 from ..identification.calibration.fit import Solution, misfit, objective, solve
 from ..identification.calibration.free_parameters import with_parameters
 from ..identification.calibration.normal_equations import NormalEquations, bounds_of, positive
-from ..identification.calibration.problem import OperatingPoint, Problem
+from ..identification.calibration.operating_point import OperatingPoint
+from ..identification.calibration.problem import Problem
 from ..identification.residuals import RESIDUALS
 from ..machine.machine import Machine
 from ..machine.parameters import Parameters

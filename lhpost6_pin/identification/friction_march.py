@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.compiled import compiled
-from ..effects.registry import law_of, states_of
+from ..effects.registry import law_of
 from ..machine.components import Actuator, Strut
 from ..machine.machine import Machine
 from ..mechanics.plant import MovingRow, Plant
@@ -21,7 +21,7 @@ from ..mechanics.port_path import PortPath
 from .inverse_dynamics import march_states
 from .prepare import MeasuredTest
 
-__all__ = ["held_friction", "least_yield", "made_fine", "march_finely", "refined", "thinned"]
+__all__ = ["least_yield", "made_fine", "march_finely", "refined", "thinned"]
 
 SHAKEN = 0.1
 """Noise of a displacement over a friction's yield slip from which it shakes presliding: 0.05 on the LHPOST6."""
@@ -145,13 +145,3 @@ def _average(z, count, out):
             for j in range(i * count - half, i * count + half + 1):
                 total += z[min(max(j, 0), z.shape[0] - 1), k]
             out[i, k] = total / (2 * half + 1)
-
-
-def held_friction(plant: Plant, share: float, rng: np.random.Generator) -> Array:
-    """Random hidden states (n_states,) of friction, their standard deviation a share of full force."""
-    out = np.zeros(len(plant.states))
-    for row in plant.rows:
-        if law_of(row).friction_memory:
-            own = out[states_of(row)]
-            own[:] = np.clip(share * rng.standard_normal(len(own)), -0.7, 0.7)  # within the unit disc
-    return out

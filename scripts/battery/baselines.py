@@ -8,8 +8,8 @@ from lhpost6_pin.discovery.candidate_columns import columns_of
 from lhpost6_pin.discovery.candidates import list_candidates
 from lhpost6_pin.identification.calibration import calibration_numbers
 from lhpost6_pin.identification.calibration.bin_rows import row_by_column
+from lhpost6_pin.identification.calibration.operating_point import OperatingPoint
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
-from lhpost6_pin.identification.calibration.problem import OperatingPoint
 
 __all__ = ["baselines"]
 

@@ -56,8 +56,16 @@ def run_test(case: Case, test: Test, effects: tuple[Effect, ...] | None = None) 
     reference = make_motion(test.settings, test.seed)
     surge = platen[0]["surge"] * _bursts(len(reference), test.seed)
     gains = make_gains(*nominal, loop_of(case.model, model(), numbers()["loop"]))
-    channels = simulate(legs, platen, nominal, gains, reference, surge, settings["substeps"])
+    held = _held(numbers()["start"]["held"], np.random.default_rng([test.seed, 3]))
+    channels = simulate(legs, platen, nominal, gains, reference, surge, settings["substeps"], held)
     return Run(channels, legs, platen, reference, surge)
+
+
+def _held(most: float, random: np.random.Generator) -> np.ndarray:
+    """Shares of friction that seals (13) and pads (6 along two axes) hold at the start, up to `most` of it (25)."""
+    size, way = most * np.sqrt(random.random(6)), random.uniform(0.0, 2.0 * np.pi, 6)
+    pads = np.stack([size * np.cos(way), size * np.sin(way)], axis=1)
+    return np.concatenate([random.uniform(-most, most, 13), pads.ravel()])
 
 
 def _bursts(n: int, seed: int) -> np.ndarray:

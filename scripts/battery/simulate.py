@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from scipy.optimize import least_squares
 
-from .rates import PA, PB, PULL, SHOWN, SPOOL, STATES, TWIST, rates
+from .rates import PA, PAD, PB, PULL, SEAL, SHOWN, SPOOL, STATES, TWIST, rates
 from .table import lengths, mass_matrix, turned
 
 __all__ = ["Channels", "Gains", "RATE", "make_gains", "simulate"]
@@ -90,8 +90,11 @@ def _jacobian(pose, legs, platen):
     return out
 
 
-def at_rest(legs: np.ndarray, platen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """State and spools of the static equilibrium: no acceleration, no flow, no forces of actuators on each other."""
+def at_rest(legs: np.ndarray, platen: np.ndarray, held: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """State and spools of the static equilibrium: no acceleration, no flow, no forces of actuators on each other.
+
+    held (25) are the shares of their friction that the seals, and the pads along two axes, hold; by default none.
+    """
     still = legs.copy()
     still["gap"] = 0.0  # play is crossed at rest without force
     inverse = np.linalg.inv(mass_matrix(platen))
@@ -100,6 +103,8 @@ def at_rest(legs: np.ndarray, platen: np.ndarray) -> tuple[np.ndarray, np.ndarra
     horizontal = legs["kind"][:10] == 0
     n_b = int(horizontal.sum())
     y, dy, shown = np.zeros(STATES), np.zeros(STATES), np.zeros(SHOWN)
+    if held is not None:
+        y[SEAL:PAD], y[PAD:SPOOL] = held[:13], held[13:]
 
     def unbalance(guess: np.ndarray) -> np.ndarray:
         y[PA : PA + 10], y[PB : PB + n_b] = guess[:10] * 1e6, guess[10 : 10 + n_b] * 1e6
@@ -135,9 +140,13 @@ def simulate(
     reference: np.ndarray,
     surge: np.ndarray,
     substeps: int,
+    held: np.ndarray | None = None,
 ) -> Channels:
-    """The table's answer to a reference motion of C (n, 6) at 2048 Hz that begins and ends at rest."""
-    y, spool = at_rest(legs, platen)
+    """The table's answer to a reference motion of C (n, 6) at 2048 Hz that begins and ends at rest.
+
+    held (25) is that of `at_rest`.
+    """
+    y, spool = at_rest(legs, platen, held)
     inverse = np.linalg.inv(mass_matrix(platen))
     reference = np.ascontiguousarray(reference)
     velocity = np.gradient(reference, 1 / RATE, axis=0)

@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..curves import FrictionCurve, ValveCurve, friction_curves, valve_curves
-from .problem import OperatingPoint
+from .operating_point import OperatingPoint
 
 __all__ = ["Curves", "measured_curves"]
 

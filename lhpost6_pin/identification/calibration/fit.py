@@ -28,8 +28,9 @@ from .curves import measured_curves
 from .expected_scatter import covariance_of_estimate, scatter_factor
 from .friction_forms import compare_friction
 from .normal_equations import NoiseBias, NormalEquations, bounded_step
+from .operating_point import OperatingPoint
 from .prepare import prepare_problem
-from .problem import OperatingPoint, Problem
+from .problem import Problem
 from .result import Calibration, calibration_numbers
 from .sensor_errors import removed_of
 from .simulated_residuals import by_simulation

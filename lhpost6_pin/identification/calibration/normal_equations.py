@@ -10,7 +10,8 @@ from ...core.arrays import Array, Complex, Mask
 from ...core.progress import Progress
 from ...machine.parameters import Parameters
 from .bin_rows import BinRows, SparseBins, bin_rows, row_by_column
-from .problem import OperatingPoint, Problem, Slopes
+from .operating_point import OperatingPoint
+from .problem import Problem, Slopes
 from .whitened_residuals import excess
 
 __all__ = ["NoiseBias", "NormalEquations", "bounded_step", "bounds_of", "positive"]

@@ -35,18 +35,19 @@ def prepare_problem(
     *,
     kinds: tuple[str, ...] = KINDS,
     others: Callable[[Machine], Sequence[Machine]] = lambda machine: (),
-    preload: float = 0.0,
     seed: int = 0,
     jobs: int = -1,
 ) -> Problem:
     """The least-squares problem of a campaign; `numbers` are those of `models/procedures/calibration.toml`.
 
     `others` gives equally plausible machines (with friction of another form, with oil warmer in one test than in
-    others); they and `preload` are sources of noise (`Problem`). Deterministic for a seed (of the simulated noise).
+    others), whose differences are noise (`Problem`). Deterministic for a seed (of the simulated noise).
     Raises what `calibrate` does.
     """
     n = numbers.number
-    comparison = ResidualBands(numbers.vector("comparison.bands"), n("comparison.edge"), n("fit.step"))
+    comparison = ResidualBands(
+        numbers.vector("comparison.bands"), n("comparison.edge"), n("fit.step"), n("friction.held")
+    )
     _refuse(machine, records, comparison)
     _refuse_free_of_noise(machine, records, sensors)
     machine = machine.as_tested(records[0].attrs, "the first test")
@@ -81,7 +82,7 @@ def prepare_problem(
     again = [drawn(policy) for _ in range(int(n("fit.corrections")))]
     problem = Problem(
         *(machine, tests, noisy, sensors, comparison),
-        again=again, jobs=jobs, kinds=kinds, others=others(machine), preload=preload, delays=removed,
+        again=again, jobs=jobs, kinds=kinds, others=others(machine), delays=removed,
     )  # fmt: skip
     problem.specimen = specimen
     return problem

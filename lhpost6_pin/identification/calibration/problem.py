@@ -17,18 +17,20 @@ from ...data.sensors import SensorSet
 from ...machine.machine import Machine
 from ...machine.specimen import Specimen
 from ...mechanics.plant import Plant, make_plant
-from ..friction_march import held_friction, made_fine
+from ..friction_march import made_fine
 from ..prepare import MeasuredTest
 from ..residual_change import Evaluated, change_of
-from ..residuals import RESIDUALS, Path, Residuals, evaluate_residuals, follow, kinds_shown, with_ports
+from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, kinds_shown
 from .bin_rows import SparseBins, sparse_bins
 from .free_parameters import FreeParameter, parameter_changes
+from .operating_point import OperatingPoint
 from .parameters_of_tests import parameters_of_tests
 from .scale import find_scale, without_held
 from .sensor_errors import RemovedDelay, SensorUnknown, corrected, sensor_unknowns
+from .start_states import StartStates, no_start_states, start_states, start_wrenches
 from .whitened_residuals import make_whitener, spectrum_of
 
-__all__ = ["KINDS", "OperatingPoint", "ResidualBands", "Problem", "Slopes", "EvaluationGroup"]
+__all__ = ["KINDS", "ResidualBands", "Problem", "Slopes", "EvaluationGroup"]
 
 Slopes = dict[int, SparseBins]
 """Derivatives of a test's whitened bins, by the unknown's place in x."""
@@ -37,16 +39,13 @@ KINDS = ("wrench", "flow", "gas", "force")
 """Kinds of residuals that are compared by default."""
 
 
-KEPT = 4
-"""Sets of ports along which a test's path is kept."""
-
-
 class ResidualBands(NamedTuple):
     """How residuals are compared."""
 
     bands: tuple[float, ...]  # edges [Hz] of bands of frequency, each with its own noise
     edge: float  # cut off at both ends of a test [s]
     step: float  # of an unknown, for its derivative, in prior standard deviations
+    held: float  # of full friction, prior deviation of what friction holds at the start of a test
 
 
 class EvaluationGroup(NamedTuple):
@@ -73,15 +72,14 @@ class Problem:
         jobs: int = -1,
         kinds: tuple[str, ...] = KINDS,
         others: Sequence[Machine] = (),
-        preload: float = 0.0,
         delays: tuple[RemovedDelay, ...] = (),
     ) -> None:
         """Prepare the problem; all tests have the same channels.
 
         noisy are draws of the tests in order, any number of times, each with more noise, from which the whitener is
         made; `again` are further ones, for the correction of derivatives. Noise also includes differences of residuals
-        between equally plausible machines (`others`), and friction's state at the start of a test, of which a share
-        `preload` is unknown. `delays` were removed from the tests. Raises RecordError if they are too short together.
+        between equally plausible machines (`others`). `delays` were removed from the tests. Raises RecordError if they
+        are too short together.
         """
         self.delays, plant = delays, make_plant(machine)
         self.axes = plant.axes  # free twist components of the platen
@@ -104,16 +102,13 @@ class Problem:
         self.widths = tuple(x.shape[1] for x in clean[0])
         self.frequency = [self.bins(r, t)[1] for r, t in zip(clean, tests, strict=True)]
         noise = self._noise(plant, clean)
-        instead, rng = [make_plant(other) for other in others], np.random.default_rng(0)
+        instead = [make_plant(other) for other in others]
         for found, test, base in zip(noise, tests, clean, strict=True):
             # friction's state is uncertain by the difference between the raw and the smoothed path; that weighs as
-            # much as all draws together, and so do the initial state and each of the other machines
+            # much as all draws together, and so does each of the other machines
             more = []
             if test.weight is None:
                 more.append(evaluate_residuals(plant, replace(test, path=None), kinds))
-            if preload > 0.0:
-                held = follow(plant, test, start=held_friction(plant, preload, rng))
-                more.append(evaluate_residuals(plant, test, kinds, path=held))
             more += [evaluate_residuals(one, test, kinds) for one in instead]
             draws = len(found)
             found += [self.bins(_less(one, base), test)[0] * np.sqrt(draws) for one in more]
@@ -121,6 +116,7 @@ class Problem:
         # where all friction acts along one axis or two, what its form leaves there is no noise of other kinds
         kinds_of = None if machine.motion == "free" else np.repeat(np.arange(len(self.widths)), self.widths)
         self.whitener = make_whitener(noise, self.frequency, np.array(comparison.bands), kinds_of)
+        self.starts = [self._starts(plant, t) for t in range(len(tests))]
 
     def _set(self, machine: Machine, parameters: tuple[FreeParameter, ...]) -> "Problem":
         """Set the machine and its free parameters; returns itself."""
@@ -167,7 +163,9 @@ class Problem:
 
     def scaled(self, scale: Array) -> "Problem":
         """The same problem, its whitened residuals scaled by test and band (t, b, c)."""
-        return self._with(whitener=self.whitener.scaled(scale))
+        whitener = self.whitener.scaled(scale)
+        each = enumerate(zip(self.starts, self.frequency, strict=True))
+        return self._with(whitener=whitener, starts=[one.scaled(scale[t, whitener.band(f)]) for t, (one, f) in each])
 
     def only(self, places: Sequence[int]) -> "Problem":
         """The same problem with some of its tests; noise is weighed as with all."""
@@ -176,6 +174,7 @@ class Problem:
             noisy=tuple(t for i, t in enumerate(self.noisy) if i % len(self.tests) in places),
             again=tuple(tuple(draw[t] for t in places) for draw in self.again),
             frequency=[self.frequency[t] for t in places],
+            starts=[self.starts[t] for t in places],
             whitener=self.whitener._replace(factor=self.whitener.factor[list(places)]),
         )
 
@@ -210,15 +209,26 @@ class Problem:
         """Mask of the stacked residuals' columns that are not zero by the machine's guides."""
         return np.asarray(np.any([self.rows(kind) for kind in RESIDUALS], axis=0))
 
-    def residual(self, base: "OperatingPoint") -> list[Complex]:
+    def residual(self, base: OperatingPoint) -> list[Complex]:
         """Whitened bins (m, c) of every test at an operating point."""
         pairs = zip(base.residuals, base.tests, strict=True)
         return [self._whitened(i, self.bins(r, test)[0]) for i, (r, test) in enumerate(pairs)]
 
     def _whitened(self, test: int, bins: Complex) -> Complex:
-        return np.asarray(self.whitener.apply(test, bins[..., None], self.frequency[test])[..., 0])
+        return self.whitened(test, bins[..., None])[..., 0]
 
-    def slopes(self, base: "OperatingPoint", free: Mask, progress: Callable[[float], None]) -> list[Slopes]:
+    def whitened(self, test: int, bins: Complex) -> Complex:
+        """Whitened bins (m, c, p) of a test's `bins`, less what friction's state at its start explains."""
+        return self.starts[test].less(self.whitener.apply(test, bins, self.frequency[test]))
+
+    def _starts(self, plant: Plant, test: int) -> StartStates:
+        """How friction's states at the start of a test move its whitened bins."""
+        wrench, f = start_wrenches(plant, self.tests[test]), self.frequency[test]
+        if not wrench.shape[2]:
+            return no_start_states(len(f))
+        return start_states(self.whitener.apply(test, self.comparison.held * self.of_wrench(test, wrench), f))
+
+    def slopes(self, base: OperatingPoint, free: Mask, progress: Callable[[float], None]) -> list[Slopes]:
         """Derivatives of the whitened bins of every test by the unknowns in `free` (p,), by differences."""
         groups = [g for g in self.groups if any(free[i] for i, _ in g.members)]
         out: list[Slopes] = [{} for _ in self.tests]
@@ -231,7 +241,7 @@ class Problem:
         return out
 
     def _difference(
-        self, base: "OperatingPoint", group: EvaluationGroup, free: Mask
+        self, base: OperatingPoint, group: EvaluationGroup, free: Mask
     ) -> list[tuple[int, list[SparseBins]]]:
         """Derivatives of every test's whitened bins, by place in x."""
         x, count = base.x, len(self.parameters)
@@ -254,7 +264,7 @@ class Problem:
 
     def change(
         self,
-        base: "OperatingPoint",
+        base: OperatingPoint,
         plant: Plant,
         residuals: tuple[str, ...],
         tests: Sequence[MeasuredTest] | None = None,
@@ -270,7 +280,7 @@ class Problem:
             changes.append(self.bins(change_of(before, plant, test, path, kinds), test)[0])
         return changes
 
-    def plant_at(self, x: Array, near: "OperatingPoint | None" = None) -> Plant:
+    def plant_at(self, x: Array, near: OperatingPoint | None = None) -> Plant:
         """Plant with its parameters set to x (p,); sooner from a point `near` it, where little has to be set."""
         machine, at = self.machine, (x, near.x if near else x)
         changes, known = (parameter_changes(machine, self.parameters, y[: len(self.parameters)]) for y in at)
@@ -312,33 +322,6 @@ class Problem:
         if names[place] in double:
             rows |= self.rows("flow", len(names) + double.index(names[place]))
         return rows
-
-
-class OperatingPoint:
-    """Tests, paths and residuals evaluated at x, from which differences are taken."""
-
-    def __init__(self, problem: Problem, x: Array) -> None:
-        """Evaluate a problem's tests at x (p,)."""
-        self.x, self.plant = x, problem.plant_at(x)
-        self.tests = [corrected(t, problem.unknowns, x[len(problem.parameters) :]) for t in problem.tests]
-        self.paths = [follow(self.plant, t) for t in self.tests]
-        pairs = zip(self.tests, self.paths, strict=True)
-        self.residuals = [evaluate_residuals(self.plant, t, problem.kinds, path=p) for t, p in pairs]
-        self._extended: dict[tuple[str, ...], tuple[Plant, list[Path]]] = {self.plant.ports: (self.plant, self.paths)}
-
-    def with_ports_of(self, other: Plant) -> tuple[Plant, list[Path]]:
-        """Plant and paths with the ports of another plant, on which an effect may act that is not there yet."""
-        if (known := self._extended.get(other.ports)) is not None:
-            return known
-        own, plant = self.plant.ports, replace(self.plant, ports=other.ports)
-        if plant.geometry != other.geometry or other.ports[: len(own)] != own:
-            return self.plant, self.paths
-        pairs = zip(self.tests, self.paths, strict=True)
-        found = plant, [with_ports(plant, test, path) for test, path in pairs]
-        if len(self._extended) >= KEPT:  # candidates at many places would fill the memory
-            self._extended.popitem()
-        self._extended[other.ports] = found
-        return found
 
 
 def _less(after: Residuals, before: Residuals) -> Residuals:

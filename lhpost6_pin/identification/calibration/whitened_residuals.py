@@ -67,7 +67,7 @@ class Whitener(NamedTuple):
         for b, low, high in zip(bands, first, (*first[1:], len(f)), strict=True):
             part = bins[low:high, used]
             mixed = self.factor[test, b][:, used] @ part.swapaxes(0, 1).reshape(len(used), len(part) * bins.shape[2])
-            out[low:high] = mixed.reshape(-1, len(part), bins.shape[2]).swapaxes(0, 1)
+            out[low:high] = mixed.reshape(len(mixed), len(part), bins.shape[2]).swapaxes(0, 1)
         return out
 
 

@@ -112,12 +112,14 @@ def inverse_dynamics(
     floor_acceleration: ArrayLike | None = None,
     mounted: Plant | None = None,
     path: Array | None = None,
+    start: Array | None = None,
     model_step: bool = False,
 ) -> Decomposition:
-    """Forces behind a motion of C and Euler angles, friction states starting at rest.
+    """Forces behind a motion of C and Euler angles.
 
     time (n,) uniform [s]; actuator_force (n, n_actuators) [N]; strut_pressure (n, n_struts) [Pa] or None. path (n, 6)
-    is the displacement that friction follows, where it is not the motion's (`FusedMotion.path`). floor_acceleration
+    is the displacement that friction follows, where it is not the motion's (`FusedMotion.path`). start (n_states,) are
+    friction's states at the start, by default zero. floor_acceleration
     (n, n_floors) [m/s2] are those measured on a specimen's floors: their base shear is the effect `base_shear` of the
     ledger. mounted is the plant with a specimen, where `plant` is without: the wrench on the platen of that specimen,
     its joints and modes driven by the motion (`driven_wrenches`), is the effect `specimen` of the ledger. model_step:
@@ -133,7 +135,7 @@ def inverse_dynamics(
     dt = float(t[-1] - t[0]) / (len(t) - 1)
     moved = plant_motion(plant, motion)
     along = moved if path is None else plant_motion(plant, motion._replace(displacement=path))
-    z = march_states(plant, ports_along(plant, along), dt)
+    z = march_states(plant, ports_along(plant, along), dt, start)
     v = np.vstack([moved.v[:1], moved.v[:-1] + dt * moved.a[:-1]]) if model_step else moved.v
     states = States(plant, t, moved.q, v, moved.a, z)
     measured = [np.asarray(actuator_force, float)]

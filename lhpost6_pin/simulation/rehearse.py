@@ -134,11 +134,13 @@ def replay(
     record: xr.Dataset,
     *,
     attrs: Mapping[str, Any],
+    friction: Array | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> SimulatedTest:
     """Drive the plant with a record's spool positions, from rest with the pressures of its first sample.
 
+    friction (n_states,) are the states of friction at the start, by default zero.
     Where two servovalves of an actuator were recorded apart, it follows their joint spool (`data.valve_pairs`). The
     spools of a simulated record at the controller's rate are held over each sample (as they were); those of any
     other are interpolated, band-limited, to the model steps. Raises RecordError naming missing channels, or the
@@ -163,7 +165,9 @@ def replay(
         samples = math.floor(t_old[-1] * SAMPLE_RATE + 1e-6)  # no sample is lost to rounding
         middle = (np.arange(samples * (steps // SAMPLE_RATE)) + 0.5) / steps
         spool = resample_band_limited(recorded, t_old, np.minimum(middle, t_old[-1]))
-    run = simulate(plant, OpenLoop(spool, _start(plant, record)), samples=samples, progress=progress, **options)
+    run = simulate(
+        plant, OpenLoop(spool, _start(plant, record, friction)), samples=samples, progress=progress, **options
+    )
     run = with_pressure_trouble(_usable(run))
     return SimulatedTest(run, record_of_run(run, {"spool_interpolation": "held" if held else "band-limited", **attrs}))
 
@@ -185,10 +189,10 @@ def _usable(run: Run) -> Run:
     return replace(run, **rows, command=command)
 
 
-def _start(plant: Plant, record: xr.Dataset) -> State:
-    """Zero pose at rest with the chamber pressures of the record's first sample."""
+def _start(plant: Plant, record: xr.Dataset, friction: Array | None) -> State:
+    """Zero pose at rest with the chamber pressures of the record's first sample, and states of `friction`."""
     zero = specimen_at_rest(plant)
-    z = zero.z.copy()
+    z = zero.z.copy() if friction is None else zero.z + friction
     for name, row in zip(plant.machine.actuator_names, plant.rows[plant.tables.actuators], strict=True):
         z[row["state"]] = float(record["chamber_pressure_a"].sel(actuator=name)[0])
         if name in plant.machine.double_acting:

@@ -17,6 +17,7 @@ from ...machine.parameters import Parameters
 from ...mechanics.plant import make_plant
 from ...mechanics.pose import plant_motion
 from ...simulation.specimen_response import driven_wrenches
+from ..friction_start import start_deviation
 from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, prepare_test
 from .problem import KINDS, Problem, ResidualBands
 from .sensor_errors import removed_delays
@@ -46,7 +47,7 @@ def prepare_problem(
     """
     n = numbers.number
     comparison = ResidualBands(
-        numbers.vector("comparison.bands"), n("comparison.edge"), n("fit.step"), n("friction.held")
+        numbers.vector("comparison.bands"), n("comparison.edge"), n("fit.step"), start_deviation()
     )
     _refuse(machine, records, comparison)
     _refuse_free_of_noise(machine, records, sensors)

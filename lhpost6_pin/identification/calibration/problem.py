@@ -18,6 +18,7 @@ from ...machine.machine import Machine
 from ...machine.specimen import Specimen
 from ...mechanics.plant import Plant, make_plant
 from ..friction_march import made_fine
+from ..friction_start import start_wrenches
 from ..prepare import MeasuredTest
 from ..residual_change import Evaluated, change_of
 from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, kinds_shown
@@ -27,7 +28,7 @@ from .operating_point import OperatingPoint
 from .parameters_of_tests import parameters_of_tests
 from .scale import find_scale, without_held
 from .sensor_errors import RemovedDelay, SensorUnknown, corrected, sensor_unknowns
-from .start_states import StartStates, no_start_states, start_states, start_wrenches
+from .start_states import StartStates, no_start_states, start_states
 from .whitened_residuals import make_whitener, spectrum_of
 
 __all__ = ["KINDS", "ResidualBands", "Problem", "Slopes", "EvaluationGroup"]
@@ -223,7 +224,7 @@ class Problem:
 
     def _starts(self, plant: Plant, test: int) -> StartStates:
         """How friction's states at the start of a test move its whitened bins."""
-        wrench, f = start_wrenches(plant, self.tests[test]), self.frequency[test]
+        (wrench, _), f = start_wrenches(plant, self.tests[test]), self.frequency[test]
         if not wrench.shape[2]:
             return no_start_states(len(f))
         return start_states(self.whitener.apply(test, self.comparison.held * self.of_wrench(test, wrench), f))

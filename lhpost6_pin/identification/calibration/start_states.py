@@ -1,8 +1,7 @@
 """Friction's state at the start of a test, which nothing measures: what it changes is taken out of the residuals.
 
-Seals and pads hold a part of their friction from where the platen came. Two states along one slip differ by an amount
-that decays with the travel and is nearly proportional to their first difference. The change of the whitened bins by
-each state is therefore known but for its size, for which there is a prior. Without it the covariance of the bins is
+The change of the whitened bins by each state (`friction_start`) is known but for its size, for which there is a prior.
+Without it the covariance of the bins is
 the identity I, with it I + D D^T, where D are those changes, one prior deviation each; what is compared is multiplied
 by the inverse root of that: along the singular vectors of D by (1 + s^2)^-1/2, elsewhere by one. This is the estimate
 with one more unknown for each state.
@@ -14,17 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.arrays import Array, Complex
-from ...effects.registry import law_of, states_of
-from ...mechanics.plant import Plant
-from ..inverse_dynamics import with_loads
-from ..prepare import MeasuredTest, actuator_forces
-from ..residual_kernels import row_wrenches
-from ..residuals import follow
 
-__all__ = ["StartStates", "no_start_states", "start_states", "start_wrenches"]
-
-APART = 0.5
-"""State, of full friction, above and below zero between which its change of the wrench is taken."""
+__all__ = ["StartStates", "no_start_states", "start_states"]
 
 LEAST = 0.1
 """Singular value, in deviations of noise, below which a direction is left: it would change by half a per cent."""
@@ -52,30 +42,6 @@ class StartStates(NamedTuple):
         """The same for whitened bins that are larger by a scale (m, c)."""
         own = scale[:, self.columns, None]
         return self._replace(directions=self.directions * own, duals=self.duals / own)
-
-
-def start_wrenches(plant: Plant, test: MeasuredTest) -> Array:
-    """Wrenches (n, 6, k) on the platen at C in {c} [N, N m] by a unit of each of k friction states at the start.
-
-    There are none (k = 0) where forces are not measured, as there is no balance of them.
-    """
-    force = actuator_forces(plant.machine, test.channels)
-    rows = np.array([row for row in plant.rows if law_of(row).friction_memory], plant.rows.dtype)
-    if force is None or not len(rows):
-        return np.zeros((test.samples, 6, 0))
-    sizes = [states_of(row).stop - states_of(row).start for row in rows]
-    found = []
-    for place in range(max(sizes)):
-        some = rows[[size > place for size in sizes]]
-        sides = []
-        for start in (APART, -APART):
-            state = np.zeros(len(plant.states))
-            state[[states_of(row).start + place for row in some]] = start
-            path = follow(plant, test, start=state)
-            z = with_loads(plant, path.ports, path.required, path.z, force)
-            sides.append(row_wrenches(plant, path.ports, z, some))
-        found.append((sides[0] - sides[1]) / (2.0 * APART))
-    return np.concatenate(found, axis=1).swapaxes(1, 2)
 
 
 def start_states(whitened: Complex) -> StartStates:

@@ -173,7 +173,7 @@ def _noise(found: Decomposed, sensors: SensorSet, rng: np.random.Generator) -> C
     """Change by a second draw of noise."""
     policy = AS_RECORDED._replace(band=found.comparison.band)
     noisier = prepare_test(found.plant, add_noise(found.record, sensors, rng), sensors, policy)
-    drawn = decompose_test(found.mounted, noisier)[0]
+    drawn = decompose_test(found.mounted, noisier, found.whole.states.z[0])[0]
     return Change(drawn.residual - found.whole.residual, drawn.carried - found.whole.carried)
 
 
@@ -199,7 +199,7 @@ def _by_sensors(found: Decomposed, sensors: SensorSet) -> Iterator[Change]:
         scaled = [x.copy() for x in found.test.motion]
         for x in scaled:
             x[:, axis] *= 1.0 + gain
-        moved = decompose_test(found.mounted, replace(found.test, motion=PlatenMotion(*scaled)))[0]
+        moved = decompose_test(found.mounted, replace(found.test, motion=PlatenMotion(*scaled)), whole.states.z[0])[0]
         yield Change(moved.residual - whole.residual, moved.carried - whole.carried)
 
 

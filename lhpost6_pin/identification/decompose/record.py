@@ -22,11 +22,13 @@ from ...data.measured_sensors import find_sensors
 from ...data.records import is_measured, require, sample_interval
 from ...data.sensors import SensorSet
 from ...data.signals import Band
+from ...effects.registry import law_of, states_of
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
 from ...mechanics.interface_wrench import bare
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import PlatenMotion
+from ..friction_start import estimate_start
 from ..inverse_dynamics import Decomposition, inverse_dynamics
 from ..known_slip import UNKNOWN_SLIP, slip_summary
 from ..prepare import (
@@ -153,11 +155,14 @@ def decompose_record(
     return Decomposed(test, sensors, comparison, whole, forces, motion, inside, delays, notes, mounted)
 
 
-def decompose_test(plant: Plant, test: MeasuredTest) -> tuple[Decomposition, tuple[str, ...]]:
+def decompose_test(
+    plant: Plant, test: MeasuredTest, start: Array | None = None
+) -> tuple[Decomposition, tuple[str, ...]]:
     """Inverse dynamics of a test, and notes on the sources of its forces and motion.
 
     The equations are those of the table without specimen; the wrench of a specimen on the plant is an effect, as its
-    model predicts it, or as its floors' accelerations show it where they were measured.
+    model predicts it, or as its floors' accelerations show it where they were measured. start (n_states,) are the
+    states of friction at the start; by default those of `estimate_start` in a measured test, zero in a simulated one.
     """
     mounted, plant = plant, bare(plant)
     record, force = test.record, actuator_forces(plant.machine, test.channels)
@@ -180,14 +185,24 @@ def decompose_test(plant: Plant, test: MeasuredTest) -> tuple[Decomposition, tup
     else:
         step = ", at the model's steps; forces use the velocity of the step." if at_steps else "."
         notes.append(f"Simulated without noise: the platen's motion is the record's own{step}")
+    if start is None:
+        start = estimate_start(plant, test, decompose_numbers().number("comparison.cutoff"))
+        notes += _held(plant, start) if start.any() else []
     time = record["time"].values
     floors = test.channels.get("floor_acceleration") if plant.machine.floors else None
     modelled = mounted if mounted is not plant and floors is None and mounted.coupled is None else None
     found = inverse_dynamics(
         *(plant, time, test.motion, force, struts),
-        floor_acceleration=floors, mounted=modelled, path=test.path, model_step=at_steps,
+        floor_acceleration=floors, mounted=modelled, path=test.path, start=start, model_step=at_steps,
     )  # fmt: skip
     return found, tuple(notes)
+
+
+def _held(plant: Plant, start: Array) -> list[str]:
+    """A note on the friction that is held at the start of a test."""
+    shares = [np.linalg.norm(start[states_of(row)]) for row in plant.rows if law_of(row).friction_memory]
+    largest = 100.0 * max(shares, default=0.0)
+    return [f"Seals or pads hold up to {largest:.0f} % of their friction at the start, by the balance of forces."]
 
 
 def _filtered(

@@ -27,6 +27,7 @@ from ...simulation.rehearse import rehearse, replay
 from ...simulation.simulate import fastest_engine
 from ...tuning.drives import load_drive
 from ..decompose.record import decompose_test
+from ..friction_start import estimate_start
 from ..known_slip import slip_summary
 from ..prepare import source_of
 from .phase_agreement import ColumnAgreement, ComparedQuantity, agree
@@ -85,7 +86,8 @@ def run_phase(number: int, test: PreparedTest) -> Phase:
 def _inverse_dynamics(test: PreparedTest) -> Phase:
     numbers, axes = test.basis.numbers, test.plant.axes
     columns = tuple(AXES[k] for k in axes)
-    (found, notes), (again, _) = (decompose_test(test.plant, one) for one in (test.test, test.again))
+    found, notes = decompose_test(test.plant, test.test)
+    again, _ = decompose_test(test.plant, test.again, found.states.z[0])
     calibration, inside = wrench_calibration(test)[axes], numbers.inside(test.test.samples, test.test.dt)
     pairs = []
     for quantity, *sides in _SIDES:
@@ -106,7 +108,9 @@ def _inverse_dynamics(test: PreparedTest) -> Phase:
 
 def _open_loop(test: PreparedTest) -> Phase:
     engine = fastest_engine(test.plant)
-    ran, again = (replay(test.plant.machine, m.record, attrs={}, engine=engine) for m in (test.test, test.again))
+    held = None if test.plant.flexible else estimate_start(test.plant, test.test, test.basis.numbers.band.high)
+    machine = test.plant.machine
+    ran, again = (replay(machine, m.record, attrs={}, friction=held, engine=engine) for m in (test.test, test.again))
     channels = ("actuator_force", "chamber_pressure_a", "chamber_pressure_b")
     return _of_run(2, SimulatedComparison(test, ran, again), channels)
 

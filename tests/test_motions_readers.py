@@ -260,5 +260,5 @@ def test_an_equal_unit_in_another_spelling_passes_and_words_that_are_no_unit_giv
     for head in ("x_filtered", "x (raw)", "x"):
         motion = load_motion(written(tmp_path, "words.csv", text.format(head)), units="g")
         assert motion.samples[1, 0] == pytest.approx(0.5 * GRAVITY)
-    with pytest.raises(MotionError, match="'blob' does not fit axis x"):
-        load_motion(written(tmp_path, "g.csv", text.format("x_g")), units="blob")
+    with pytest.raises(MotionError, match="'xyzzy' does not fit axis x"):
+        load_motion(written(tmp_path, "g.csv", text.format("x_g")), units="xyzzy")

@@ -2,15 +2,14 @@
 
     python scripts/stroke_overshoot.py [--machine lhpost6] [--share 0.95] [--out DIR]
 
-Triangles and sines along every free translation take a share of the stroke or of the stated displacement, whichever is
-less, and run with the machine's own controller; motions that another limit ends before are left out. Prints the largest
-share of target and achieved motion, and the difference, which `limits.stroke_reserve` of the machine files allows for.
-Writes stroke_overshoot.json.
+Triangles and sines along every free translation, the fastest of them with all flow that is left to it, take a share of
+the stroke or of the stated displacement, whichever is less, and run with the machine's own controller; motions that
+another limit ends before are left out. Prints the largest share of target and achieved motion, and the difference,
+which `limits.stroke_reserve` of the machine files allows for. Writes stroke_overshoot.json.
 """
 
 import json
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -40,6 +39,9 @@ WAVES: tuple[tuple[str, dict[str, float]], ...] = (
 )
 """Kinds of motion with their options in SI; the second triangle turns within 20 ms."""
 
+NEARLY = 0.99
+"""Share of the flow left to a motion that the fastest sine takes."""
+
 
 def shares(plant: Plant, motion: PlatenMotion) -> dict[str, float]:
     """Largest demand over the full capacity of a motion by quantity."""
@@ -60,20 +62,34 @@ def motion_of(target: Target) -> PlatenMotion:
     return PlatenMotion(target.displacement, target.velocity, target.acceleration)
 
 
+def taking(plant: Plant, share: float, kind: str, axis: str, options: dict[str, float]) -> Target:
+    """A wave along an axis that takes a share of the travel."""
+    motion = find_motion(kind, axis=axis, amplitude=plant.machine.limits.displacement[AXES.index(axis)], **options)
+    target = make_target(motion, rate=float(SAMPLE_RATE))
+    for _ in range(4):  # elongations are not quite linear in the motion
+        factor = share / of_travel(shares(plant, motion_of(target)))
+        target = with_scale(target, factor * target.reference.scale)
+    return target
+
+
+def fastest(plant: Plant, share: float, axis: str) -> dict[str, float]:
+    """Period of the sine that takes a share of the travel and nearly all flow that is left to it."""
+    used = shares(plant, motion_of(taking(plant, share, "sine", axis, {"period": 5.0})))
+    flow = max(used["velocity"], used["actuator velocity"] / (1.0 - plant.machine.limits.valve_reserve))
+    return {"period": 5.0 * flow / NEARLY}
+
+
 def targets(plant: Plant, share: float) -> Iterator[tuple[str, Target]]:
-    """Waves along the free translations that take a share of the travel, and no more of another limit."""
-    limits = plant.machine.limits
-    for k in (k for k in plant.axes if k < 3):
-        for kind, options in WAVES:
-            make = partial(find_motion, kind, axis=AXES[k], **options)
-            target = make_target(make(amplitude=limits.displacement[k]), rate=float(SAMPLE_RATE))
-            for _ in range(4):  # elongations are not quite linear in the motion
-                factor = share / of_travel(shares(plant, motion_of(target)))
-                target = with_scale(target, factor * target.reference.scale)
-            most = max(value for name, value in shares(plant, motion_of(target)).items() if name not in OF_TRAVEL)
-            if most < 1.0 - limits.valve_reserve:
-                words = ", ".join(f"{key} {value:g}" for key, value in options.items())
-                yield f"{kind} {AXES[k]} ({words})", target
+    """Waves along the free translations that take a share of the travel, and no more than is left of another limit."""
+    reserve = plant.machine.limits.valve_reserve
+    for axis in (AXES[k] for k in plant.axes if k < 3):
+        for kind, options in (*WAVES, ("sine", fastest(plant, share, axis))):
+            target = taking(plant, share, kind, axis, options)
+            used = shares(plant, motion_of(target))
+            most = max(value for name, value in used.items() if name not in (*OF_TRAVEL, "actuator velocity"))
+            if most < 1.0 and used["actuator velocity"] < 1.0 - reserve:
+                words = ", ".join(f"{key} {value:.3g}" for key, value in options.items())
+                yield f"{kind} {axis} ({words})", target
 
 
 def study(machines: list[str], share: float | None) -> list[dict[str, Any]]:
@@ -116,7 +132,9 @@ def main(
         table.add_row(row["machine"], row["motion"], *numbers)
     console = Console(width=110)
     console.print(table)
-    console.print(f"largest overshoot: {100 * max(row['overshoot'] for row in rows):.2f} % of the travel")
+    for name in dict.fromkeys(row["machine"] for row in rows):
+        most = max(row["overshoot"] for row in rows if row["machine"] == name)
+        console.print(f"{name}: largest overshoot {100 * most:.2f} % of the travel")
     with write_whole(out / "stroke_overshoot.json") as path:
         path.write_text(json.dumps(rows, indent=1))
 

@@ -343,21 +343,21 @@ def test_a_tall_specimen_is_judged_by_the_moments_that_the_reaction_mass_bears()
 
 # --------------------------------------------------------------------------------- reserve of the strokes
 def test_the_largest_scale_leaves_the_reserve_of_strokes_and_displacements_and_what_is_achieved_may_take_it():
-    """Closed form on the guided table: 0.2 m to 97 % of 0.15 m; a motion of 0.149 m is refused, achieved it fits."""
+    """Closed form on the guided table: 0.2 m to 98 % of 0.15 m; a motion of 0.149 m is refused, achieved it fits."""
     plant = make_plant(load_machine("uniaxial"))
     target = make_target(find_motion("triangle", amplitude=0.2), rate=2048.0)
     peak = float(np.abs(target.displacement[:, 0]).max())
-    with pytest.raises(OutOfRangeError, match=r"x displacement .* against 0\.15 m less the reserve of 3 %") as caught:
+    with pytest.raises(OutOfRangeError, match=r"x displacement .* against 0\.15 m less the reserve of 2 %") as caught:
         check_motion_limits(plant, target)
-    assert caught.value.largest_scale == rounded_down(0.97 * 0.15 / peak, 3) == fitting_scale(plant, target)
+    assert caught.value.largest_scale == rounded_down(0.98 * 0.15 / peak, 3) == fitting_scale(plant, target)
     close = with_scale(target, 0.149 / peak)
-    with pytest.raises(OutOfRangeError, match=r"A1 actuator stroke .* of its stroke less the reserve of 3 %"):
+    with pytest.raises(OutOfRangeError, match=r"A1 actuator stroke .* of its stroke less the reserve of 2 %"):
         check_motion_limits(plant, close)
     motion = PlatenMotion(close.displacement, close.velocity, close.acceleration)
     shares = {p.quantity: p.utilisation for p in judge_motion(plant, motion).peaks if p.decides and p.name in "xA1"}
     assert shares["displacement"] == pytest.approx(0.149 / 0.15) == shares["actuator stroke"]
     bound = table_performance(plant)[0].bound("displacement")
-    assert bound.value == pytest.approx(0.97 * 0.15) and bound.by.endswith("less 3 %")
+    assert bound.value == pytest.approx(0.98 * 0.15) and bound.by.endswith("less 2 %")
 
 
 ENDING = [
@@ -365,6 +365,9 @@ ENDING = [
     pytest.param("uniaxial", "triangle", {}, id="triangle"),
     pytest.param("lhpost6", "triangle", {"axis": "z"}, id="triangle z", marks=pytest.mark.long),
     pytest.param("lhpost6", "sine", {"axis": "z", "period": 5.0}, id="sine z", marks=pytest.mark.long),
+    pytest.param(
+        "lhpost6", "sine", {"axis": "y", "amplitude": 0.4, "period": 1.6}, id="sine y", marks=pytest.mark.long
+    ),
 ]
 
 
@@ -373,7 +376,7 @@ def test_a_motion_at_the_scale_that_fits_leaves_no_stroke_and_none_of_its_limits
     """At the scale to the very stroke A1 left it after 4.9 s (TX), and vertical pistons met their bumpers."""
     machine = load_machine(name)
     plant = make_plant(machine)
-    full = make_target(find_motion(kind, amplitude=0.2, **options), rate=float(SAMPLE_RATE))
+    full = make_target(find_motion(kind, **{"amplitude": 0.2, **options}), rate=float(SAMPLE_RATE))
     target = with_scale(full, fitting_scale(plant, full))
     test = rehearse(machine, target, load_controller(machine.controller), attrs={"test": "fits"}, engine="fused")
     assert test.run.trouble is None and len(test.run.time) == len(target.time)

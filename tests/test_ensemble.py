@@ -250,7 +250,7 @@ def test_a_plan_file_names_itself_and_finds_files_beside_it(tmp_path):
         load_plan(tmp_path / "suite.toml")
 
 
-def test_a_plan_states_what_a_text_of_numbers_does_not(tmp_path):
+def test_a_plan_states_what_a_text_of_numbers_does_not(tmp_path, caplog):
     """A column's dt, unit and channels as `run` takes them, and a taper of displacements."""
     wave = np.sin(2.0 * np.pi * 0.02 * np.arange(500))
     (tmp_path / "column.txt").write_text("\n".join(f"{x:.6f}" for x in wave))
@@ -262,6 +262,12 @@ def test_a_plan_states_what_a_text_of_numbers_does_not(tmp_path):
         planned.motion.samples[100:400, 1], 1e-3 * wave[100:400], atol=1e-9
     )  # six decimals of mm
     np.testing.assert_array_equal(planned.motion.samples[[0, -1], 1], 0.0)
+    assert not caplog.records
+    (tmp_path / "suite.toml").write_text(stated.replace("taper = 2\n", ""))
+    (blunt,) = load_plan(tmp_path / "suite.toml").motions.values()
+    blunt.target(load_machine(), 1.0)  # of one of many runs
+    (warning,) = caplog.records  # of the plan alone
+    assert "column: y starts at" in warning.getMessage() and "--taper" in warning.getMessage()
     (tmp_path / "suite.toml").write_text(stated.replace("unit = 'mm'\n", ""))
     with pytest.raises(MotionError, match=r"column\.txt.*unit, as --unit g"):
         load_plan(tmp_path / "suite.toml")

@@ -161,7 +161,11 @@ def test_shares_of_valves_and_strokes_are_rates_over_speeds_and_elongations_over
     away = np.array([[0.3, 0, 0, 0, 0, 0.0]])
     legs, _ = leg_displacements(plant, away)
     stroke = next(d for d in check(away, still[:1], still[:1]) if d.quantity == "actuator stroke")
-    assert stroke.share[0, :4] == pytest.approx(np.abs(legs[0, :4]) / 0.75)
+    usable = (1.0 - plant.machine.limits.stroke_reserve) * 0.75
+    assert stroke.share[0, :4] == pytest.approx(np.abs(legs[0, :4]) / usable)
+    assert stroke.of == "of its stroke less the reserve of 6 %"
+    full = next(d for d in check(away, still[:1], still[:1], achieved=True) if d.quantity == "actuator stroke")
+    assert full.share[0, :4] == pytest.approx(np.abs(legs[0, :4]) / 0.75) and full.of == "of its stroke"
 
 
 @pytest.mark.parametrize(

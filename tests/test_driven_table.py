@@ -636,7 +636,9 @@ def test_messages_are_in_the_units_of_the_fields(orders):
 
 def test_a_refusal_for_capacity_is_in_the_units_of_the_page(machine):
     plant, gain = make_plant(machine), np.array([0.3, 0.0, 0.0, 0.0, 0.0, 0.0])
-    with pytest.raises(OutOfRangeError, match=r"x displacement 1000 mm against 890 mm at") as caught:
+    with pytest.raises(
+        OutOfRangeError, match=r"x displacement 1000 mm against 890 mm less the reserve of 6 % at"
+    ) as caught:
         check_program(plant, sine(), gain, np.array([0.7, 0.0, 0.0, 0.0, 0.0, 0.0]))
     for frequency in (3.0, 8.0):
         with pytest.raises(OutOfRangeError, match=r"acceleration [\d.]+ g against [\d.]+ g") as caught:

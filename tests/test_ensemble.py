@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from commands import refused
 from hypothesis import given
 from hypothesis import strategies as st
 from machine_cases import machine_named
@@ -223,6 +224,12 @@ def test_no_index_is_estimated_from_few_machines_or_of_a_result_that_does_not_va
         ({"machine": "uniaxial", "motion": [{**SINE, "axes": "x,y=x"}]}, "cannot move in y"),
         ({"rate": 5000}, "multiple"),
         ({"motion": [3]}, "is 3; write a table"),
+        ({"motion": [{**SINE, "dt": 0.02}]}, r"\[\[motion\]\]: dt is for motions from files"),
+        (
+            {"motion": [{"files": ["x.csv"], "dt": 0.02, "options": {"time_step": 0.01}}]},
+            "dt is in options, too, as time_",
+        ),
+        ({"motion": [{"files": ["x.csv"], "dt": "fast"}]}, "dt is 'fast'; give float"),
     ],
 )
 def test_a_plan_that_cannot_be_names_its_key(entries, message):
@@ -241,6 +248,45 @@ def test_a_plan_file_names_itself_and_finds_files_beside_it(tmp_path):
     (tmp_path / "suite.toml").write_text("machines = \n")
     with pytest.raises(ParameterError, match=r"suite\.toml: .*line 1"):
         load_plan(tmp_path / "suite.toml")
+
+
+def test_a_plan_states_what_a_text_of_numbers_does_not(tmp_path, caplog):
+    """A column's dt, unit and channels as `run` takes them, and a taper of displacements."""
+    wave = np.sin(2.0 * np.pi * 0.02 * np.arange(500))
+    (tmp_path / "column.txt").write_text("\n".join(f"{x:.6f}" for x in wave))
+    stated = "[[motion]]\nfiles = ['column.txt']\ndt = 0.02\nunit = 'mm'\nchannels = 'y=1'\ntaper = 2\n"
+    (tmp_path / "suite.toml").write_text(stated)
+    (planned,) = load_plan(tmp_path / "suite.toml").motions.values()
+    assert planned.motion.time_step == 0.02 and planned.motion.axes == ("y",)
+    np.testing.assert_allclose(
+        planned.motion.samples[100:400, 1], 1e-3 * wave[100:400], atol=1e-9
+    )  # six decimals of mm
+    np.testing.assert_array_equal(planned.motion.samples[[0, -1], 1], 0.0)
+    assert not caplog.records
+    (tmp_path / "suite.toml").write_text(stated.replace("taper = 2\n", ""))
+    (blunt,) = load_plan(tmp_path / "suite.toml").motions.values()
+    blunt.target(load_machine(), 1.0)  # of one of many runs
+    (warning,) = caplog.records  # of the plan alone
+    assert "column: y starts at" in warning.getMessage() and "--taper" in warning.getMessage()
+    (tmp_path / "suite.toml").write_text(stated.replace("unit = 'mm'\n", ""))
+    with pytest.raises(MotionError, match=r"column\.txt.*unit, as --unit g"):
+        load_plan(tmp_path / "suite.toml")
+
+
+def test_hints_of_the_command_for_a_text_of_numbers_name_options_that_it_has(lhpost6, tmp_path, monkeypatch):
+    (tmp_path / "column.txt").write_text("0.0\n0.1\n0.0\n" * 50)
+    assert refused(lhpost6("ensemble", "column.txt"), "as --unit g")
+    assert refused(lhpost6("ensemble", "column.txt", "--unit", "g"), "as --dt 0.01")
+    assert refused(lhpost6("ensemble", "sine", "--dt", "0.02"), "sine: --dt is for motions from files, and none is one")
+    (tmp_path / "plan.toml").write_text('[[motion]]\nname = "sine"\n')
+    assert refused(lhpost6("ensemble", "plan.toml", "--dt", "0.02"), "a plan states dt of each")
+    seen = []
+    monkeypatch.setattr(ensemble, "run_ensemble", lambda made, *_, **__: seen.append(made) or sys.exit(0))
+    given = ("--dt", 0.02, "--unit", "g", "--channels", "y=1", "--high-pass", 0.5, "--low-pass", 20)
+    lhpost6("ensemble", "column.txt", "sine", *given)
+    column, sine = seen[0].motions.values()
+    assert column.motion.time_step == 0.02 and column.motion.axes == ("y",) and sine.motion.axes == ("x",)
+    assert (column.high_pass, column.low_pass) == (0.5, 20.0)
 
 
 def test_everything_that_results_follow_from_is_in_the_digest_of_a_plan():

@@ -104,6 +104,15 @@ def test_a_mat_file_with_columns_named_after_axes_needs_no_more(tmp_path):
     np.testing.assert_allclose(motion.samples[:, [0, 2]], np.outer(WAVE, [GRAVITY, 2]), rtol=1e-12)
 
 
+def test_a_unit_that_contradicts_that_of_a_data_file_is_refused(tmp_path):
+    savemat(tmp_path / "m.mat", {"t": TIME, "ax_g": WAVE})
+    with pytest.raises(MotionError, match=r"m\.mat, 'ax_g': states the unit g, and --unit is m/s2; leave --unit out"):
+        load_any_motion(tmp_path / "m.mat", units="m/s2")
+    np.testing.assert_array_equal(
+        load_any_motion(tmp_path / "m.mat", units="g").samples, load_any_motion(tmp_path / "m.mat").samples
+    )
+
+
 @pytest.mark.parametrize("version", ["4", "5"])
 def test_one_series_of_a_mat_file_takes_step_and_unit_from_options(tmp_path, version):
     path = tmp_path / "one.mat"

@@ -12,6 +12,7 @@ from lhpost6_pin.cli.options import Valves
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import OutOfRangeError, SimulationError
 from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.core.rounding import rounded_down
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.machine.machine import build_machine, load_machine
 from lhpost6_pin.machine.strength import stated_strength
@@ -27,7 +28,8 @@ from lhpost6_pin.mechanics.port_path import ports_along
 from lhpost6_pin.mechanics.pose import PlatenMotion, leg_displacements, plant_motion
 from lhpost6_pin.mechanics.strokes import stroke_ends
 from lhpost6_pin.motions import find_motion, make_target, with_scale
-from lhpost6_pin.simulation.motion_limits import check_motion_limits, fitting_scale, judge_motion
+from lhpost6_pin.simulation.motion_limits import check_motion_limits, fitting_scale, judge_motion, judge_record
+from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
 from lhpost6_pin.simulation.trouble import run_doubts, with_pressure_trouble
@@ -337,3 +339,47 @@ def test_a_tall_specimen_is_judged_by_the_moments_that_the_reaction_mass_bears()
     assert loaded.share[1, 1] == pytest.approx(
         abs(5.0 * inertia.mass * inertia.lever[2]) / strength.reaction_moment[1], rel=0.05
     )
+
+
+# --------------------------------------------------------------------------------- reserve of the strokes
+def test_the_largest_scale_leaves_the_reserve_of_strokes_and_displacements_and_what_is_achieved_may_take_it():
+    """Closed form on the guided table: 0.2 m to 98 % of 0.15 m; a motion of 0.149 m is refused, achieved it fits."""
+    plant = make_plant(load_machine("uniaxial"))
+    target = make_target(find_motion("triangle", amplitude=0.2), rate=2048.0)
+    peak = float(np.abs(target.displacement[:, 0]).max())
+    with pytest.raises(OutOfRangeError, match=r"x displacement .* against 0\.15 m less the reserve of 2 %") as caught:
+        check_motion_limits(plant, target)
+    assert caught.value.largest_scale == rounded_down(0.98 * 0.15 / peak, 3) == fitting_scale(plant, target)
+    close = with_scale(target, 0.149 / peak)
+    with pytest.raises(OutOfRangeError, match=r"A1 actuator stroke .* of its stroke less the reserve of 2 %"):
+        check_motion_limits(plant, close)
+    motion = PlatenMotion(close.displacement, close.velocity, close.acceleration)
+    shares = {p.quantity: p.utilisation for p in judge_motion(plant, motion).peaks if p.decides and p.name in "xA1"}
+    assert shares["displacement"] == pytest.approx(0.149 / 0.15) == shares["actuator stroke"]
+    bound = table_performance(plant)[0].bound("displacement")
+    assert bound.value == pytest.approx(0.98 * 0.15) and bound.by.endswith("less 2 %")
+
+
+ENDING = [
+    pytest.param("uniaxial", "triangle", {"velocity": 0.25, "corner_acceleration": 3.0}, id="TX of a campaign"),
+    pytest.param("uniaxial", "triangle", {}, id="triangle"),
+    pytest.param("lhpost6", "triangle", {"axis": "z"}, id="triangle z", marks=pytest.mark.long),
+    pytest.param("lhpost6", "sine", {"axis": "z", "period": 5.0}, id="sine z", marks=pytest.mark.long),
+    pytest.param(
+        "lhpost6", "sine", {"axis": "y", "amplitude": 0.4, "period": 1.6}, id="sine y", marks=pytest.mark.long
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "kind", "options"), ENDING)
+def test_a_motion_at_the_scale_that_fits_leaves_no_stroke_and_none_of_its_limits(name, kind, options):
+    """At the scale to the very stroke A1 left it after 4.9 s (TX), and vertical pistons met their bumpers."""
+    machine = load_machine(name)
+    plant = make_plant(machine)
+    full = make_target(find_motion(kind, **{"amplitude": 0.2, **options}), rate=float(SAMPLE_RATE))
+    target = with_scale(full, fitting_scale(plant, full))
+    test = rehearse(machine, target, load_controller(machine.controller), attrs={"test": "fits"}, engine="fused")
+    assert test.run.trouble is None and len(test.run.time) == len(target.time)
+    achieved = test.record["platen_displacement"].values
+    assert not stroke_ends(plant, test.run.time, achieved)
+    assert judge_record(plant, test.record, fits=False).governing.utilisation <= 1.0

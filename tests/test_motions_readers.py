@@ -230,3 +230,35 @@ def test_any_text_is_a_unit_or_a_motion_error(text, axis):
     except MotionError:
         return
     assert factor[0] > 0 and quantity in ("acceleration", "displacement")
+
+
+@pytest.mark.parametrize(
+    ("head", "stated", "channels"),
+    [("x_g", "m/s2", None), ("X Accel [g]", "m/s2", None), ("x_mm", "m", None), ("Accel_g", "gal", "x=2")],
+)
+def test_a_unit_stated_that_contradicts_the_header_is_refused_with_both_and_an_equal_one_passes(
+    tmp_path, head, stated, channels
+):
+    """Read as m/s2, a motion in g is 9.81 times too small, and nothing else shows it."""
+    own = "mm" if "mm" in head else "g"
+    path = written(tmp_path, "m.csv", f"time_s,{head}\n0,0\n0.01,0.5\n0.02,0\n")
+    with pytest.raises(
+        MotionError, match=rf"m\.csv, column '.*': states the unit {own}, and --unit is {stated}; leave"
+    ):
+        load_motion(path, units=stated, channels=channels)
+    with pytest.raises(MotionError, match=f"states the unit {own}, and --unit is {stated}"):
+        load_motion(path, units={"x": stated}, channels=channels)
+    alone, same = (load_motion(path, units=units, channels=channels) for units in (None, own))
+    np.testing.assert_array_equal(alone.samples, same.samples)
+    assert alone.samples[1, 0] == pytest.approx(0.5 * (1e-3 if own == "mm" else GRAVITY))
+
+
+def test_an_equal_unit_in_another_spelling_passes_and_words_that_are_no_unit_give_way(tmp_path):
+    text = "time_s,{}\n0,0\n0.01,0.5\n0.02,0\n"
+    gal = load_motion(written(tmp_path, "gal.csv", text.format("x_cm_s2")), units="gal")
+    assert gal.samples[1, 0] == pytest.approx(0.005)
+    for head in ("x_filtered", "x (raw)", "x"):
+        motion = load_motion(written(tmp_path, "words.csv", text.format(head)), units="g")
+        assert motion.samples[1, 0] == pytest.approx(0.5 * GRAVITY)
+    with pytest.raises(MotionError, match="'xyzzy' does not fit axis x"):
+        load_motion(written(tmp_path, "g.csv", text.format("x_g")), units="xyzzy")

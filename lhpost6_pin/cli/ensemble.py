@@ -11,7 +11,21 @@ from ..core.names import ENGINES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import complete_motion, completing
-from .motion_options import MatchSpectrum, RotateBy, SpectrumDamping, TimeScale
+from .motion_options import (
+    FileChannels,
+    FileRotate,
+    FileRotations,
+    FileStep,
+    FileUnit,
+    HighPass,
+    LowPass,
+    MatchSpectrum,
+    RotateBy,
+    SpectrumDamping,
+    Taper,
+    TimeScale,
+    is_file,
+)
 
 if TYPE_CHECKING:
     from ..studies.plan import EnsemblePlan
@@ -59,10 +73,18 @@ def ensemble(
         typer.Option(help="Groups of results kept: tracking, limits, strengths, forces, spectra, base."),
     ] = None,
     axes: Annotated[str | None, typer.Option(help="Axes of motions named here, such as xyz, x, or x=y.")] = None,
+    high_pass: HighPass = None,
+    low_pass: LowPass = None,
     time_scale: TimeScale = None,
+    taper: Taper = None,
     rotate_by: RotateBy = None,
     match_spectrum: MatchSpectrum = None,
     spectrum_damping: SpectrumDamping = None,
+    dt: FileStep = None,
+    unit: FileUnit = None,
+    channels: FileChannels = None,
+    rotate: FileRotate = None,
+    rotation_factor: FileRotations = None,
     engine: Annotated[
         str | None,
         typer.Option(
@@ -101,8 +123,21 @@ def ensemble(
         "quantities": [word.strip() for word in quantities.split(",")] if quantities is not None else None,
         "engine": engine,
     }
-    processing = {"axes": axes, "time_scale": time_scale, "rotate_by": rotate_by, "spectrum_damping": spectrum_damping}
-    processing["match_spectrum"] = None if match_spectrum is None else str(match_spectrum)
+    processing = {
+        "axes": axes,
+        "high_pass": high_pass,
+        "low_pass": low_pass,
+        "time_scale": time_scale,
+        "taper": taper,
+        "rotate_by": rotate_by,
+        "match_spectrum": None if match_spectrum is None else str(match_spectrum),
+        "spectrum_damping": spectrum_damping,
+        "dt": dt,
+        "unit": unit,
+        "channels": channels,
+        "rotate": rotate,
+        "rotation_factor": rotation_factor,
+    }
     processing = {key: value for key, value in processing.items() if value is not None}
     made = _plan(plan, processing, {key: value for key, value in given.items() if value is not None})
     folder = opt.folder_for(out, made.name.replace("/", "_"), "report.html", own=RESULTS)
@@ -128,7 +163,7 @@ def _numbers(text: str | None) -> list[float] | None:
 
 def _plan(words: list[str], processing: dict[str, Any], given: dict[str, Any]) -> "EnsemblePlan":
     """The plan in a file, with the options given in place of its entries; or of motions with these options."""
-    from ..studies.plan_file import load_plan, plan_from
+    from ..studies.plan_file import OF_FILES, load_plan, plan_from
 
     if Path(words[0]).suffix == ".toml":
         if len(words) > 1:
@@ -139,7 +174,13 @@ def _plan(words: list[str], processing: dict[str, Any], given: dict[str, Any]) -
                 f"--{flag.replace('_', '-')} is for motions named on the command line; a plan states {flag} of each"
             )
         return load_plan(Path(words[0]), given)
-    motions = [{"files": [word]} if Path(word).suffix else {"name": word} for word in words]
+    of_files = {key: processing.pop(key) for key in OF_FILES if key in processing}
+    files = [word for word in words if is_file(word)]
+    if of_files and not files:
+        raise ParameterError(
+            f"{', '.join(words)}: --{next(iter(of_files)).replace('_', '-')} is for motions from files, and none is one"
+        )
+    motions = [{"files": [word], **of_files} if word in files else {"name": word} for word in words]
     entries: dict[str, Any] = {"name": f"{'_'.join(Path(word).stem for word in words)}_ensemble", **given}
     entries["motion"] = [one | processing for one in motions]
     return plan_from(entries, Path(), "ensemble")

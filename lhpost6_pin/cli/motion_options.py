@@ -15,11 +15,28 @@ if TYPE_CHECKING:
     from ..machine.machine import Machine
     from ..motions import GroundMotion, Target
 
-__all__ = ["MotionOptions"]
+__all__ = [
+    "FileChannels",
+    "FileRotate",
+    "FileRotations",
+    "FileStep",
+    "FileUnit",
+    "HighPass",
+    "LowPass",
+    "MatchSpectrum",
+]
+__all__ += ["MotionOptions", "RotateBy", "SpectrumDamping", "Taper", "TimeScale", "is_file"]
+
+HighPass = Annotated[float | None, typer.Option(help="High-pass corner of the motion [Hz].")]
+LowPass = Annotated[float | None, typer.Option(help="Low-pass corner of the motion [Hz].")]
 
 TimeScale = Annotated[
     float | None,
     typer.Option(help="Factor of durations; accelerations stay, displacements follow with its square (similitude)."),
+]
+Taper = Annotated[
+    float | None,
+    typer.Option(help=r"Taper at both ends of a displacement motion that does not begin and end at rest \[s]."),
 ]
 RotateBy = Annotated[
     float | None,
@@ -31,6 +48,24 @@ MatchSpectrum = Annotated[
 ]
 SpectrumDamping = Annotated[
     float | None, typer.Option(help="Damping of that spectrum, as share of critical; default: 0.05.")
+]
+
+FileStep = Annotated[
+    float | None, typer.Option("--dt", help=r"Time step of a motion file that does not state it \[s].")
+]
+FileUnit = Annotated[
+    str | None, typer.Option("--unit", help="Unit of a motion file that does not state it, such as g.")
+]
+FileChannels = Annotated[
+    str | None, typer.Option("--channels", help="Channels or columns of a motion file by axis, such as x=2,y=1,z=3.")
+]
+FileRotate = Annotated[
+    float | None,
+    typer.Option("--rotate", help=r"Azimuth that the table's x gets: turns a file's horizontal components \[deg]."),
+]
+FileRotations = Annotated[
+    float | None,
+    typer.Option("--rotation-factor", help="Factor of a file's rotations; the report's test SFU has 1000."),
 ]
 
 
@@ -49,27 +84,19 @@ class MotionOptions:
     axes: Annotated[
         str | None, typer.Option(help="Axes, such as xyz, x, or x=y (the table's x moved by component y).")
     ] = None
-    high_pass: Annotated[float | None, typer.Option(help="High-pass corner of the motion [Hz].")] = None
-    low_pass: Annotated[float | None, typer.Option(help="Low-pass corner of the motion [Hz].")] = None
+    high_pass: HighPass = None
+    low_pass: LowPass = None
     time_scale: TimeScale = None
+    taper: Taper = None
     rotate_by: RotateBy = None
     match_spectrum: MatchSpectrum = None
     spectrum_damping: SpectrumDamping = None
     set_: Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")] = None
-    dt: Annotated[float | None, typer.Option(help=r"Time step of a motion file that does not state it \[s].")] = None
-    unit: Annotated[str | None, typer.Option(help="Unit of a motion file that does not state it, such as g.")] = None
-    channels: Annotated[
-        str | None, typer.Option(help="Channels or columns of a motion file by axis, such as x=2,y=1,z=3.")
-    ] = None
-    rotate: Annotated[
-        float | None,
-        typer.Option(help=r"Azimuth that the table's x gets: turns a file's horizontal components \[deg]."),
-    ] = None
-
-    rotation_factor: Annotated[
-        float | None,
-        typer.Option(help="Factor of a file's rotations; the report's test SFU has 1000."),
-    ] = None
+    dt: FileStep = None
+    unit: FileUnit = None
+    channels: FileChannels = None
+    rotate: FileRotate = None
+    rotation_factor: FileRotations = None
 
     def target(self, table: "Machine", beyond: bool = False) -> "Target":
         """Target of the motion at the controller's rate; raises OutOfRangeError beyond the limits, unless allowed."""
@@ -88,6 +115,7 @@ class MotionOptions:
             self._ground(),
             rotate_by=self.rotate_by,
             time_scale=self.time_scale,
+            taper=self.taper,
             spectrum=spectrum,
             high_pass=self.high_pass,
             low_pass=self.low_pass,
@@ -125,18 +153,19 @@ class MotionOptions:
         stated |= {"rotate": self.rotate, "rotation_factor": self.rotation_factor}
         about_file = {key: value for key, value in stated.items() if value is not None}
         first, *files = self.motion
-        if not _is_file(first) and files and not any(map(_is_file, files)):
+        if not is_file(first) and files and not any(map(is_file, files)):
             raise MotionError(f"one motion at a time; got {', '.join(self.motion)}, none of which is a file")
-        if about_file and not (files or _is_file(first)):
+        if about_file and not (files or is_file(first)):
             raise MotionError(
                 f"{first}: --dt, --unit, --channels, --rotate and --rotation-factor are for motions from files; "
                 "--rotate-by turns any motion by an angle"
             )
-        name = None if _is_file(first) else first
+        name = None if is_file(first) else first
         return motion_of(name, files if name else self.motion, **options, **about_file)
 
 
-def _is_file(name: str) -> bool:
+def is_file(name: str) -> bool:
+    """Whether a word of a command names a file, not a motion."""
     return bool(Path(name).suffix) or Path(name).is_file()
 
 

@@ -17,7 +17,7 @@ from ..core.names import AXES
 from ..motions import GroundMotion, find_motion, load_motion
 from ..motions.components import Channels, Component, direction_of_file
 from ..motions.csv import axis_in_name
-from ..motions.motion_units import to_si
+from ..motions.motion_units import to_si, unit_of_column
 from ..motions.readers import MotionFiles, read_components, refuse_stated
 from ..motions.time_steps import uniform_step
 from .importing import RawTest, is_export, load_raw
@@ -136,8 +136,9 @@ def _find(columns: Sequence[_Column], wanted: str, axis: str, where: str) -> _Co
 def _component(axis: str | None, column: _Column, stated: Mapping[str, Any], where: str, alone: bool) -> Component:
     here = f"{where}, {column.labels[1]!r}"
     units, step = stated.get("units"), stated.get("time_step")
-    unit = (units if isinstance(units, str) else (units or {}).get(axis or "x")) or column.unit
-    if unit is None:
+    given = units.get(axis or "x") if isinstance(units, Mapping) else units
+    unit = unit_of_column(column.unit or "", given, here)
+    if not unit:
         raise MotionError(f"{here}: no unit in the file; give it, as --unit g")
     if column.time is None and step is None:
         raise MotionError(f"{here}: no time in the file; give the step in seconds, as --dt 0.01")

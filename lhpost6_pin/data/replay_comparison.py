@@ -10,6 +10,7 @@ import xarray as xr
 from ..core.arrays import Array
 from .at_rest import at_rest
 from .channels import LAYOUT, channel_unit
+from .metrics import commanded_axes
 from .signals import drift_rate, rrmse
 
 __all__ = ["Compared", "Paired", "compare", "paired"]
@@ -33,7 +34,7 @@ class Compared(NamedTuple):
     unit: str
     peak_recorded: float
     largest_difference: float
-    rrmse: float  # not-a-number for a channel at rest
+    rrmse: float  # not-a-number for a channel at rest, of displacements for an axis that is not commanded
     drift: float  # of the difference [unit/s]
 
 
@@ -52,13 +53,18 @@ def paired(measured: xr.Dataset, simulated: xr.Dataset, names: Sequence[str]) ->
 
 
 def compare(measured: xr.Dataset, simulated: xr.Dataset) -> list[Compared]:
-    """Differences of a replayed test from the recorded one by channel, on common samples; empty below two."""
-    found = []
+    """Differences of a replayed test from the recorded one by channel, on common samples; empty below two.
+
+    Axes at rest in the target (`commanded_axes`) have no RRMSE, as in a run: theirs is over noise and cross-coupling.
+    """
+    found, commanded = [], commanded_axes(measured)
     for pair in paired(measured, simulated, _COMPARED):
         step = float(measured["time"][1] - measured["time"][0])
         apart, peak = np.abs(pair.model - pair.recorded).max(axis=0), np.abs(pair.recorded).max(axis=0)
         ratio, drift = rrmse(pair.recorded, pair.model), drift_rate(pair.model - pair.recorded, step)
-        still = at_rest(pair.recorded, place=pair.name == "platen_displacement")
+        still = at_rest(pair.recorded)
+        if pair.name == "platen_displacement":
+            still = np.array([axis not in commanded for axis in pair.columns])
         for k, label in enumerate(pair.columns):
             numbers = peak[k], apart[k], math.nan if still[k] else ratio[k], drift[k]
             found.append(Compared(f"{pair.name} {label}", channel_unit(f"{pair.name}[{label}]"), *map(float, numbers)))

@@ -158,6 +158,7 @@ class Limits:
     acceleration: tuple[float, ...] = quantity_field("m/s2 | rad/s2", length=6, bound="nonnegative")
     bandwidth: float = quantity_field("Hz", bound="positive")
     valve_reserve: float = quantity_field("1", bound="fraction")
+    stroke_reserve: float = quantity_field("1", bound="fraction")
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from ..core.errors import OutOfRangeError
 from ..core.names import AXES
 from ..machine.strength import Strength, stated_strength
 from ..motions import Demand
+from ..motions.limits import less_reserve
 from .actuator_forces import axis_capacity, force_range, required_forces, rest_forces, wrench_at_bearings
 from .equilibrium import actuator_speeds, rest_remedy
 from .plant import Plant
@@ -41,8 +42,9 @@ class DemandCheck(Protocol):
 def make_motion_check(plant: Plant) -> DemandCheck:
     """Return the demands of a motion (displacement, velocity, acceleration of C and Euler angles, (n, 6) each).
 
-    Valves can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load. In a
-    motion that was `achieved` these have taken what they needed: there is no reserve.
+    Valves can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load; of strokes
+    limits.stroke_reserve is kept for overshoot. In a motion that was `achieved` these have taken what they needed:
+    there is no reserve.
     Raises SimulationError or OutOfRangeError if the actuators cannot hold what is mounted at rest.
     """
     machine = plant.machine
@@ -54,14 +56,15 @@ def make_motion_check(plant: Plant) -> DemandCheck:
     single = np.array([a.area_b is None for a in machine.actuators])
 
     def check(displacement: Array, velocity: Array, acceleration: Array, *, achieved: bool = False) -> list[Demand]:
-        reserve = 0.0 if achieved else machine.limits.valve_reserve
-        speeds, of_speed = (1.0 - reserve) * full, f"{OF_SPEED} less the reserve of {100 * reserve:g} %"
+        kept = machine.limits
+        flow, travel = (0.0, 0.0) if achieved else (kept.valve_reserve, kept.stroke_reserve)
+        speeds, usable = (1.0 - flow) * full, (1.0 - travel) * strokes
         legs, rate = leg_displacements(plant, displacement, velocity)
         moved, rate = legs[:, : plant.spools], rate[:, : plant.spools]
         fed = np.where(rate >= 0.0, rate / speeds[:, 0], -rate / speeds[:, 1])
         found = [
-            Demand("actuator velocity", names, fed, of_speed if reserve else OF_SPEED, rate),
-            Demand("actuator stroke", names, np.abs(moved) / strokes, "of its stroke", moved),
+            Demand("actuator velocity", names, fed, OF_SPEED + less_reserve(flow), rate),
+            Demand("actuator stroke", names, np.abs(moved) / usable, "of its stroke" + less_reserve(travel), moved),
         ]
         needed = required_forces(plant, PlatenMotion(displacement, velocity, acceleration), legs)
         beyond, at = needed.share - rest.share, rest.share[0]

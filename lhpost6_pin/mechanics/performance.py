@@ -1,8 +1,9 @@
 """Performance of a table under sinusoidal motion: what limits displacement, velocity and acceleration of each axis.
 
 Over frequency f the peak velocity of a sine is the least of 2 pi f D, V and A / (2 pi f): three straight lines on
-four-way logarithmic paper. D is limited by strokes, tilt and stated travel, V by valve flow less the reserve and the
-stated velocity, A by the actuators' forces with what is mounted, the strengths of parts and the stated acceleration.
+four-way logarithmic paper. D is limited by strokes and stated travel, each less its reserve, and tilt, V by valve flow
+less the reserve and the stated velocity, A by the actuators' forces with what is mounted, the strengths of parts and
+the stated acceleration.
 """
 
 from typing import NamedTuple
@@ -53,14 +54,18 @@ class AxisPerformance(NamedTuple):
 
 def table_performance(plant: Plant) -> tuple[AxisPerformance, ...]:
     """Limits of every free axis of a plant with what is mounted, as `motion_limits` judges a motion."""
-    machine, limits, strength = plant.machine, plant.machine.limits, stated_strength(plant.machine.parameters)
+    limits, strength = plant.machine.limits, stated_strength(plant.machine.parameters)
     travel, speeds = axis_travel(plant), axis_speeds(plant)
-    reserve = 1.0 - machine.limits.valve_reserve
+    reserve, usable = 1.0 - limits.valve_reserve, 1.0 - limits.stroke_reserve
+    less = f" less {100 * limits.stroke_reserve:g} %" if limits.stroke_reserve else ""
     forces = _force_bounds(plant)
     found = []
     for k in plant.axes:
         axis = AXES[k]
-        moved = [Bound(limits.displacement[k], STATED), Bound(float(travel[k]), "strokes of the actuators")]
+        moved = [
+            Bound(usable * limits.displacement[k], STATED + less),
+            Bound(usable * float(travel[k]), f"strokes of the actuators{less}"),
+        ]
         if axis in ("roll", "pitch") and np.isfinite(strength.tilt):
             moved.append(Bound(strength.tilt, "tilt of the pistons"))
         share = f"valve flow less {100 * limits.valve_reserve:.0f} %"

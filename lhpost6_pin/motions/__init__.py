@@ -1,7 +1,7 @@
 """Ground motions: reading, making, finding by name, turning into targets for the table, response spectra."""
 
 from .ac156 import required_spectrum
-from .adjust import adjust_motion, with_rotation, with_time_scale
+from .adjust import adjust_motion, with_rotation, with_taper, with_time_scale
 from .csv import load_csv
 from .library import MotionEntry, find_motion, list_motions, motion_entry, motion_options
 from .limits import (
@@ -60,5 +60,6 @@ __all__ = [
     "spectrum_errors",
     "with_rotation",
     "with_scale",
+    "with_taper",
     "with_time_scale",
 ]

@@ -1,4 +1,4 @@
-"""Motions adjusted as a whole: turned about the vertical, compressed in time, matched to a response spectrum."""
+"""Motions adjusted as a whole: turned about the vertical, scaled in time, tapered, matched to a response spectrum."""
 
 from dataclasses import replace
 
@@ -6,10 +6,11 @@ import numpy as np
 
 from ..core.errors import MotionError
 from .motion import GroundMotion
+from .process import processing, smooth_step
 from .spectral_match import SpectrumMatch, match_spectrum
 from .target_spectrum import TargetSpectrum
 
-__all__ = ["adjust_motion", "with_rotation", "with_time_scale"]
+__all__ = ["adjust_motion", "with_rotation", "with_taper", "with_time_scale"]
 
 
 def adjust_motion(
@@ -17,11 +18,12 @@ def adjust_motion(
     *,
     rotate_by: float | None = None,
     time_scale: float | None = None,
+    taper: float | None = None,
     spectrum: TargetSpectrum | None = None,
     high_pass: float | None = None,
     low_pass: float | None = None,
 ) -> tuple[GroundMotion, SpectrumMatch | None]:
-    """Motion turned by an angle [deg], then scaled in time, then matched to a spectrum; None leaves a step out.
+    """Motion turned by an angle [deg], scaled in time, tapered [s], then matched to a spectrum; None leaves a step out.
 
     With it the match, if there is one.
 
@@ -31,6 +33,8 @@ def adjust_motion(
         motion = with_rotation(motion, rotate_by)
     if time_scale is not None:
         motion = with_time_scale(motion, time_scale)
+    if taper is not None:
+        motion = with_taper(motion, taper)
     if spectrum is None:
         return motion, None
     match = match_spectrum(motion, spectrum, high_pass=high_pass, low_pass=low_pass)
@@ -75,3 +79,24 @@ def with_time_scale(motion: GroundMotion, factor: float) -> GroundMotion:
         time_scale=factor * motion.time_scale,
         spectrum=motion.spectrum and motion.spectrum.with_time_scale(factor),
     )
+
+
+def with_taper(motion: GroundMotion, seconds: float) -> GroundMotion:
+    """Displacement motion led from zero and to zero over `seconds` at its ends, with two continuous derivatives.
+
+    Raises MotionError for an acceleration, which is tapered as it is (`make_target`), or a taper that is not positive
+    or longer than half of the motion.
+    """
+    if motion.quantity == "acceleration":
+        raise MotionError(
+            f"{motion.name}: --taper is for displacements, and this is an acceleration, which is tapered over "
+            f"{processing()['taper']:g} s at both ends as it is; leave --taper out"
+        )
+    if not 0 < seconds <= motion.duration / 2:
+        raise MotionError(
+            f"{motion.name}: --taper {seconds:g}: give seconds at each end, above zero and at most half of the motion, "
+            f"{motion.duration / 2:g} s"
+        )
+    rise = smooth_step(np.arange(len(motion.samples)) * motion.time_step / seconds)[0]
+    samples = motion.samples * (rise * rise[::-1])[:, None]
+    return replace(motion, samples=samples, source=f"{motion.source}; tapered over {seconds:g} s at both ends")

@@ -12,7 +12,7 @@ from ..core.number_table import Dialect, read_rows
 from .columns import COMMAS, without_comments
 from .components import Channels, Component, Stated, assemble
 from .motion import AXES, GroundMotion
-from .motion_units import to_si
+from .motion_units import is_motion_unit, to_si, unit_of_column
 from .text import read_text
 from .time_steps import uniform_step
 
@@ -28,6 +28,7 @@ _COLUMN = re.compile(
     r"(?:[\s_]*[\[(](?P<bracketed>[^\])]*)[\])]|[_ ](?P<suffix>.+))?",
     re.I,
 )
+_IN_BRACKETS = re.compile(r"[\[(](?P<unit>[^\])]+)[\])]\s*$")
 
 
 def is_csv(text: str) -> bool:
@@ -74,13 +75,13 @@ def read_csv(text: str, where: str, **stated: Unpack[Stated]) -> list[Component]
     found = []
     step = _time_step(table, clock, names, stated.get("time_step"), where)
     for axis, column in _columns(names, clock, stated.get("channels"), f"{where}, line {start}").items():
-        unit = _unit(_COLUMN.fullmatch(names[column]), axis, stated.get("units"))
+        here = f"{where}, column {names[column]!r}"
+        unit = unit_of_column(_unit_in_name(names[column]), _stated_unit(stated.get("units"), axis), here)
         if not unit:
             raise MotionError(
                 f"{where}, line {start}: column {names[column]!r} has no unit; write it in the name "
                 f"({names[column]}_m_s2), or give --unit"
             )
-        here = f"{where}, column {names[column]!r}"
         try:
             values, quantity = to_si(table[:, column], unit, axis)
         except MotionError as error:
@@ -133,12 +134,17 @@ def _axis_of(column: str, where: str) -> str:
     return axis
 
 
-def _unit(match: "re.Match[str] | None", axis: str, units: "str | Mapping[str, str] | None") -> str:
-    if isinstance(units, str):
-        return units
-    if units is not None and axis in units:
-        return units[axis]
-    return (match["bracketed"] or match["suffix"] or "") if match else ""
+def _unit_in_name(column: str) -> str:
+    """Unit in the name of a column; of one that names no axis, in brackets or, if it is one, behind a `_`; or ""."""
+    if match := _COLUMN.fullmatch(column):
+        return match["bracketed"] or match["suffix"] or ""
+    bracketed = _IN_BRACKETS.search(column)
+    ends = [bracketed["unit"]] if bracketed else [column[mark.end() :] for mark in re.finditer("_", column)]
+    return next((end for end in ends if is_motion_unit(end)), "")
+
+
+def _stated_unit(units: "str | Mapping[str, str] | None", axis: str) -> str | None:
+    return units.get(axis) if isinstance(units, Mapping) else units
 
 
 def _time_step(table: np.ndarray, clock: int | None, names: list[str], stated: float | None, where: str) -> float:

@@ -12,7 +12,7 @@ from .motion import AXES
 from .process import Target
 
 __all__ = ["SI", "Demand", "LimitsSummary", "MotionCheck", "MotionLimits", "Peak", "Units", "check_limits"]
-__all__ += ["largest_scale", "limit_peaks", "peak_of_demand"]
+__all__ += ["largest_scale", "less_reserve", "limit_peaks", "peak_of_demand"]
 
 _QUANTITIES = ("displacement", "velocity", "acceleration")
 _FULL = 1 + 1e-6  # a motion exactly at the limit passes despite rounding
@@ -29,6 +29,7 @@ class MotionLimits:
     velocity: np.ndarray  # (6,) [m/s, rad/s]
     acceleration: np.ndarray  # (6,) [m/s^2, rad/s^2]
     rise: float | None = None  # acceleration of z upwards [m/s^2], where it differs
+    reserve: float = 0.0  # share of the displacements that is kept for overshoot
 
     def __post_init__(self) -> None:
         """Convert to read-only arrays; raises ValueError unless all are positive."""
@@ -50,6 +51,11 @@ class Demand(NamedTuple):
     value: np.ndarray | None = None  # (n, m) demand in SI
     unit: str = ""  # of `value`, where a peak states it in words
     decides: bool = True  # whether a motion beyond it is refused
+
+
+def less_reserve(share: float) -> str:
+    """What follows the name of a capacity of which a share is kept; empty without one."""
+    return f" less the reserve of {100 * share:g} %" if share else ""
 
 
 MotionCheck = Callable[[np.ndarray, np.ndarray, np.ndarray], Sequence[Demand]]
@@ -216,17 +222,17 @@ def _clauses(over: Sequence[Peak], time: np.ndarray) -> list[str]:
 def _axis_peaks(target: Motion, limits: MotionLimits, units: Units = SI) -> list[Peak]:
     peaks = []
     for quantity, per in zip(_QUANTITIES, ("", "/s", "/s^2"), strict=True):
-        values = getattr(target, quantity)
+        values, kept = getattr(target, quantity), limits.reserve if quantity == "displacement" else 0.0
         for i, axis in enumerate(AXES):
             bounds = np.full(len(values), getattr(limits, quantity)[i])
             if limits.rise is not None and (quantity, axis) == ("acceleration", "z"):
                 bounds[values[:, i] > 0.0] = limits.rise
-            shares = np.abs(values[:, i]) / bounds
+            shares = np.abs(values[:, i]) / ((1.0 - kept) * bounds)
             sample = int(np.argmax(shares))
-            value, limit = abs(float(values[sample, i])), float(bounds[sample])
+            value, limit, share = abs(float(values[sample, i])), float(bounds[sample]), float(shares[sample])
             unit = ("m" if i < 3 else "rad") + per
-            text = f"{_with_unit(value, unit, units)} against {_with_unit(limit, unit, units)}"
-            peaks.append(Peak(quantity, axis, value / limit, sample, text, value=value))
+            text = f"{_with_unit(value, unit, units)} against {_with_unit(limit, unit, units)}{less_reserve(kept)}"
+            peaks.append(Peak(quantity, axis, share, sample, text, value=value))
     return peaks
 
 

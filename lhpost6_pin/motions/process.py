@@ -8,6 +8,7 @@ continuous derivatives then brings the displacement to rest at both ends; veloci
 the product rule, (w d)' and (w d)'', so they stay consistent.
 """
 
+import logging
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
@@ -18,11 +19,14 @@ import numpy as np
 
 from ..core.errors import MotionError
 from ..core.files import models_folder
+from .joins import join_warning, sharp_joins
 from .motion import AXES, GroundMotion
 from .target_spectrum import TargetSpectrum
 from .toml import load_toml, values_of
 
 __all__ = ["Reference", "Target", "axes_map", "make_target", "processing", "smooth_step", "with_scale"]
+
+_log = logging.getLogger(__name__)
 
 _MOST = 2**24
 """Samples that a target may have: more than two hours at 2048 Hz, and 0.8 GB an array."""
@@ -111,6 +115,7 @@ def make_target(
     low_pass: float | None = None,
     pad: float | None = None,
     rate: float = 2048.0,
+    warn: bool = True,
 ) -> Target:
     """Target for the table from a ground motion.
 
@@ -119,6 +124,9 @@ def make_target(
     `models/ground_motions/tests.toml`, the high-pass over the motion's time scale; a displacement motion is not
     high-passed by default. The record is extended by `pad` [s] at both ends, over which the target comes from and goes
     to rest. `rate` is the controller's [1/s].
+
+    A displacement motion that does not begin and end at rest has a pulse of acceleration there; unless `warn` is False,
+    a warning is logged of one that exceeds the motion's own (`joins`).
 
     Raises MotionError for a window, corner or scale that makes no sense, or numbers too large to compute with.
     """
@@ -182,6 +190,12 @@ def make_target(
     displacement, velocity, acceleration = motion_of_axes = np.zeros((3, count, len(AXES)))
     motion_of_axes[:, :, moved] = w * d, w1 * d + w * v, w2 * d + 2 * w1 * v + w * a
     _refuse_infinite(motion.name, scale, displacement, velocity, acceleration)
+    if warn and not integrated:
+        reach = int(np.ceil(settings["join_reach"] * rate / low_pass))
+        excess = settings["join_excess"]
+        joins = sharp_joins(channels, motion.time_step, acceleration, rate, lead=lead, reach=reach, excess=excess)
+        if joins:
+            _log.warning("%s", join_warning(motion.name, joins))
     start = first * motion.time_step - lead / rate
     reference = Reference(motion.name, motion.source, scale, pairs, high_pass, low_pass, start, motion.time_scale)
     spectrum = motion.spectrum and motion.spectrum.on_axes(pairs).with_scale(scale)

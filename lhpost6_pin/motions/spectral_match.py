@@ -54,7 +54,7 @@ def match_spectrum(
 
     numbers = processing()
     axes = _axes(motion, spectrum)
-    target_of = partial(make_target, axes=",".join(axes), high_pass=high_pass, low_pass=low_pass)
+    target_of = partial(make_target, axes=",".join(axes), high_pass=high_pass, low_pass=low_pass, warn=False)
     first = target_of(motion)
     band = _band(motion, spectrum, first)
     frequency = _frequencies(band, spectrum.damping)

@@ -1,11 +1,13 @@
 """The limits of a motion on a machine, and the demand of a target over each of them.
 
 Limits are the displacement, velocity and acceleration of C by axis (section `limits` of the machine file, Table 2.2),
-and those of actuators and parts (`mechanics.motion_demands`): strokes, valve flow less `limits.valve_reserve`, forces
-with the specimen mounted, strengths. The comparison and the largest scale that fits are in `motions.limits`.
+and those of actuators and parts (`mechanics.motion_demands`): strokes, valve flow, forces with the specimen mounted,
+strengths. Of a target, strokes and displacements keep `limits.stroke_reserve` and valve flow `limits.valve_reserve`.
+The comparison and the largest scale that fits are in `motions.limits`.
 """
 
 import math
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -79,11 +81,12 @@ class Judgement(NamedTuple):
 def judge_motion(plant: Plant, motion: PlatenMotion, target: Target | None = None) -> Judgement:
     """Demands of an achieved motion on all limits, none refused; raises as `make_motion_check` does.
 
-    Of these the flow of the valves is what they can feed; for the scale at which the target fits, less the reserve.
+    These are the full ones; the scale at which the target fits keeps the reserves of valve flow, strokes and
+    displacements.
     """
     bounds, check = _axis_limits(plant), make_motion_check(plant)
     fits = None if target is None else largest_scale(target, bounds, check)
-    return Judgement(limit_peaks(motion, bounds, partial(check, achieved=True)), fits)
+    return Judgement(limit_peaks(motion, replace(bounds, reserve=0.0), partial(check, achieved=True)), fits)
 
 
 def judge_record(plant: Plant, record: xr.Dataset, *, fits: bool = True) -> Judgement | None:
@@ -118,7 +121,7 @@ def _axis_limits(plant: Plant) -> MotionLimits:
 
     rise = stated_strength(plant.machine.parameters).rise
     stated = six(limits.displacement), six(limits.velocity), six(limits.acceleration)
-    return MotionLimits(*stated, rise if math.isfinite(rise) else None)
+    return MotionLimits(*stated, rise if math.isfinite(rise) else None, limits.stroke_reserve)
 
 
 def _with_more_valves(plant: Plant, target: Target, least: float | None) -> str:

@@ -38,10 +38,11 @@ class PlannedMotion(NamedTuple):
     high_pass: float | None = None  # [Hz]
     low_pass: float | None = None  # [Hz]
 
-    def target(self, machine: Machine, scale: float) -> Target:
-        """Target at the controller's rate; on a guided machine along its free axes."""
+    def target(self, machine: Machine, scale: float, *, warn: bool = False) -> Target:
+        """Target at the controller's rate; on a guided machine along its free axes. `warn` as of `make_target`."""
         axes = self.axes or (None if machine.motion == "free" else machine.motion)
-        return make_target(self.motion, scale=scale, axes=axes, high_pass=self.high_pass, low_pass=self.low_pass)
+        high, low = self.high_pass, self.low_pass
+        return make_target(self.motion, scale=scale, axes=axes, high_pass=high, low_pass=low, warn=warn)
 
 
 class Block(NamedTuple):
@@ -91,7 +92,7 @@ class EnsemblePlan:
             check_options(make_plant(machine), plugged=False, **self.options[label])
         bare = make_plant(self.machine)
         for motion in self.motions.values():
-            refuse_blocked_axes(bare, motion.target(self.machine, self.scales[0]))
+            refuse_blocked_axes(bare, motion.target(self.machine, self.scales[0], warn=True))
 
     @cached_property
     def options(self) -> dict[str, dict[str, Any]]:

@@ -10,6 +10,7 @@
 
     [[motion]]                           # name or files; label, axes, high_pass, low_pass, options
     name = "ridgecrest"                  # rotate_by [deg], time_scale, match_spectrum (a file), spectrum_damping
+                                         # taper [s]; of files dt [s], unit, channels, rotate [deg], rotation_factor
 
     [[specimen]]                         # name or file ("none": bare table); label, at, rpy, locked
     name = "none"
@@ -36,7 +37,11 @@ from .draws import DESIGNS, draw_machines
 from .plan import EnsemblePlan, PlannedMotion
 from .quantities import DEFAULT
 
-__all__ = ["NONE", "beside", "load_plan", "plan_from"]
+__all__ = ["NONE", "OF_FILES", "beside", "load_plan", "plan_from"]
+
+OF_FILES = {"dt": "time_step", "unit": "units", "channels": "channels", "rotate": "rotate"}
+OF_FILES |= {"rotation_factor": "rotation_factor"}
+"""Keys of a motion from files, named as the options of commands, with the options of `load_motion` that they are."""
 
 NONE = "none"
 """Name of the specimen of a bare table."""
@@ -47,8 +52,9 @@ _KINDS: Mapping[str, tuple[type, ...]] = {
     **dict.fromkeys(("uncertain", "scales", "quantities", "motion", "specimen", "controller"), (list,)),
 }
 _MOTION: Mapping[str, tuple[type, ...]] = {
-    **dict.fromkeys(("name", "label", "axes", "match_spectrum"), (str,)),
-    **dict.fromkeys(("high_pass", "low_pass", "rotate_by", "time_scale", "spectrum_damping"), (float, int)),
+    **dict.fromkeys(("name", "label", "axes", "match_spectrum", "unit", "channels"), (str,)),
+    **dict.fromkeys(("high_pass", "low_pass", "rotate_by", "time_scale", "taper", "spectrum_damping"), (float, int)),
+    **dict.fromkeys(("dt", "rotate", "rotation_factor"), (float, int)),
     "files": (list,),
     "options": (dict,),
 }
@@ -161,11 +167,19 @@ def _motion(entry: Mapping[str, Any], folder: Path, source: str) -> tuple[str, P
     spectrum = entry.get("match_spectrum")
     if spectrum is None and "spectrum_damping" in entry:
         raise ParameterError(f"{source}: [[motion]]: spectrum_damping is that of match_spectrum; give both")
+    options, of_files = entry.get("options", {}), [key for key in OF_FILES if key in entry]
+    if of_files and not files:
+        raise ParameterError(
+            f"{source}: [[motion]]: {of_files[0]} is for motions from files; give files, or leave it out"
+        )
+    if twice := [key for key in of_files if OF_FILES[key] in options]:
+        raise ParameterError(f"{source}: [[motion]]: {twice[0]} is in options, too, as {OF_FILES[twice[0]]}; give one")
     corners = {key: entry.get(key) for key in ("high_pass", "low_pass")}
     motion, _ = adjust_motion(
-        motion_of(entry.get("name"), files, **entry.get("options", {})),
+        motion_of(entry.get("name"), files, **options, **{OF_FILES[key]: entry[key] for key in of_files}),
         rotate_by=entry.get("rotate_by"),
         time_scale=entry.get("time_scale"),
+        taper=entry.get("taper"),
         spectrum=load_spectrum(folder / spectrum, entry.get("spectrum_damping")) if spectrum else None,
         **corners,
     )

@@ -204,6 +204,7 @@ def machine_text(case: Case) -> str:
         _row("acceleration", [stall / s["mass"], *along], "m/s2 | rad/s2", "stall force"),
         _row("bandwidth", 25.0, "Hz", "motions"),
         _row("valve_reserve", 0.15, "1", "usual"),
+        _row("stroke_reserve", 0.03, "1", "usual"),
     ]
     sections = {
         "machine": ['name = "table"', 'motion = "x"', 'thrust = "report"', 'controller = "uniaxial"'],

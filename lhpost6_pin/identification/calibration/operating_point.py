@@ -1,13 +1,13 @@
 """A problem's tests, their paths and residuals at one set of unknowns, from which differences are taken."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Protocol
 
 from ...core.arrays import Array
 from ...mechanics.plant import Plant
 from ..prepare import MeasuredTest
 from ..residuals import Path, evaluate_residuals, follow, with_ports
+from .free_parameters import FreeParameter
 from .sensor_errors import SensorUnknown, corrected
 
 __all__ = ["OperatingPoint"]
@@ -19,9 +19,9 @@ KEPT = 4
 class Unknowns(Protocol):
     """Tests, and the unknowns on which their residuals depend: a `Problem`."""
 
-    parameters: Sequence[Any]
-    unknowns: Sequence[SensorUnknown]
-    tests: Sequence[MeasuredTest]
+    parameters: tuple[FreeParameter, ...]
+    unknowns: tuple[SensorUnknown, ...]
+    tests: tuple[MeasuredTest, ...]
     kinds: tuple[str, ...]
 
     def plant_at(self, x: Array) -> Plant:

@@ -230,7 +230,8 @@ def _limits(
         key: Quantity(tuple(map(_floor, values)), unit, "derived", source)
         for key, (values, unit, source) in reasons.items()
     }
-    return {**found, **{key: basis.typical[f"limits.{key}"] for key in ("bandwidth", "valve_reserve")}}
+    usual = ("bandwidth", "valve_reserve", "stroke_reserve")
+    return {**found, **{key: basis.typical[f"limits.{key}"] for key in usual}}
 
 
 # --------------------------------------------------------------------------------------------- numbers

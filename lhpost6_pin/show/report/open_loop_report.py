@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...data.metrics import commanded_axes, kinds, sampling
+from ...data.metrics import kinds, sampling
 from ...data.replay_comparison import Compared, Paired, paired
 from .page import Block, Figure, Headline, Level, Page, Section, Table, details, grid, missing, number, save_page
 from .plots import ACHIEVED, TARGET, Row, Trace, time_figure
@@ -27,6 +27,10 @@ ACTUATORS = {
 """Title and scale of a channel of actuators or struts."""
 BUCKETS = 320  # stretches of a channel over time, each drawn by its least and greatest sample
 _ROW = 110  # [CSS px]
+_TABLE_WORDS = (
+    "At rest: an axis that the target does not move, or a channel that does not move; its difference is noise and "
+    "cross-coupling, and has no RRMSE."
+)
 _COLOURS = "Grey: recorded, blue: model."
 
 
@@ -46,8 +50,7 @@ def write_open_loop_report(
     """
     start, step = sampling(measured)
     pairs = {pair.name: pair for pair in paired(measured, simulated, (*MOTION, *ACTUATORS))}
-    judged = _of_moving_axes(measured, compared)
-    verdict, level = _verdict(simulated, judged)
+    verdict, level = _verdict(simulated, compared)
     attrs = simulated.attrs
     load = "bare table" if attrs["specimen"] == "none" else f"specimen {attrs['specimen']}"
     page = Page(
@@ -60,8 +63,8 @@ def write_open_loop_report(
         verdict=verdict,
         level=level,
         headlines=[
-            _worst(judged, "platen_displacement", "Worst displacement RRMSE"),
-            _worst(judged, "actuator_force", "Worst actuator force RRMSE"),
+            _worst(compared, "platen_displacement", "Worst displacement RRMSE", _of_moving(compared)),
+            _worst(compared, "actuator_force", "Worst actuator force RRMSE"),
             _drift(compared),
         ],
         sections=[
@@ -71,7 +74,7 @@ def write_open_loop_report(
                 for name, (title, _) in ACTUATORS.items()
                 if name in simulated
             ),
-            Section("differences", "Table of differences", [comparison_table(compared)]),
+            Section("differences", "Table of differences", [_TABLE_WORDS, comparison_table(compared)]),
             Section("assumptions", "Assumptions and sources", machine_blocks(list(machine_table))),
         ],
         notes=notes,
@@ -104,13 +107,19 @@ def _verdict(simulated: xr.Dataset, compared: Sequence[Compared]) -> tuple[str, 
     words = [f"{word} {percent(one.rrmse)} ({_label(one)})" for word, one in worst if one is not None]
     if not words:
         return "The model was driven by the recorded spools; neither displacements nor forces are compared.", "plain"
-    return f"Driven by the recorded spools, the model differs by an RRMSE of {' and '.join(words)} at most.", "plain"
+    of = _of_moving(compared)
+    of = f"; displacement {of}" if of and worst[0][1] is not None else ""
+    return (
+        f"Driven by the recorded spools, the model differs by an RRMSE of {' and '.join(words)} at most{of}.",
+        "plain",
+    )
 
 
-def _of_moving_axes(measured: xr.Dataset, compared: Sequence[Compared]) -> list[Compared]:
-    """Channels by which a replay is judged: those of axes at rest in the target are noise for the most."""
-    commanded = commanded_axes(measured)
-    return [c for c in compared if not c.channel.startswith("platen_displacement") or _label(c) in commanded]
+def _of_moving(compared: Sequence[Compared]) -> str:
+    """Axes by which displacements are judged, in words; empty if none of the record's is at rest."""
+    own = [c for c in compared if c.channel.startswith("platen_displacement")]
+    moving = [_label(c) for c in own if not math.isnan(c.rrmse)]
+    return f"of the axes that move ({', '.join(moving)})" if 0 < len(moving) < len(own) else ""
 
 
 def _largest(compared: Sequence[Compared], name: str) -> Compared | None:
@@ -123,12 +132,12 @@ def _label(one: Compared) -> str:
     return one.channel.split()[1]
 
 
-def _worst(compared: Sequence[Compared], name: str, label: str) -> Headline:
+def _worst(compared: Sequence[Compared], name: str, label: str, of: str = "") -> Headline:
     one = _largest(compared, name)
     return (
         Headline("–", label, f"no {name} in the record")
         if one is None
-        else Headline(percent(one.rrmse), label, _label(one))
+        else Headline(percent(one.rrmse), label, f"{_label(one)}, {of}" if of else _label(one))
     )
 
 
@@ -142,7 +151,7 @@ def _drift(compared: Sequence[Compared]) -> Headline:
 
 
 def _motion_blocks(pairs: dict[str, Paired], compared: Sequence[Compared], start: float, step: float) -> list[Block]:
-    """Motion of every axis over time; axes at rest in the record collapsed."""
+    """Motion of every axis over time; axes at rest collapsed."""
     absent = [name for name in MOTION if name not in pairs]
     blocks: list[Block] = [missing(absent, "They are not compared.")] if absent else []
     if len(absent) == len(MOTION):
@@ -159,7 +168,7 @@ def _motion_blocks(pairs: dict[str, Paired], compared: Sequence[Compared], start
         drawn = _figure(f"motion-{axis}", axis_title(axis), rows, start, step)
         (resting if axis in still else moving).append(drawn)
     blocks.append(grid(*moving, pairs=True))
-    return [*blocks, details(f"Axes at rest in the record ({len(resting)})", *resting)] if resting else blocks
+    return [*blocks, details(f"Axes at rest ({len(resting)})", *resting)] if resting else blocks
 
 
 def _actuator_blocks(pairs: dict[str, Paired], name: str, start: float, step: float) -> list[Block]:

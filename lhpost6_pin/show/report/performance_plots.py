@@ -83,8 +83,9 @@ def performance_blocks(
     """Return the paper of every axis, those of the motion alone if there is one, and the table of governing limits."""
     words = (
         "Four-way logarithmic paper: lines rising to the right are equal displacement, lines falling equal "
-        "acceleration. A sine below the curve is within all limits of this axis: strokes and tilt, valve flow less its "
-        "reserve, forces of the actuators with what is mounted, strengths, and stated limits. Dotted: stated bandwidth."
+        "acceleration. A sine below the curve is within all limits of this axis: strokes, stated displacement and "
+        "valve flow less their reserves, tilt, forces of the actuators with what is mounted, strengths, and other "
+        "stated limits. Dotted: stated bandwidth."
     )
     if motion:
         words += (

@@ -34,10 +34,11 @@ def limit_blocks(uses: Sequence[LimitUse]) -> list[Block]:
         return [f"{NOT_EVALUATED}; `show_report` of the whole test, or `lhpost6 run`, has them.", limit_table(uses)]
     words = (
         "For each quantity the axis or actuator with the largest demand over capacity. The capacity of actuator "
-        "velocity is that of the unloaded piston at full spool, of which the check before the run leaves a reserve "
-        "(limits.valve_reserve of the machine file). Unloading is the loss of a bearing actuator's force, "
-        "from rest to its least chamber pressure; forces and moments along an axis are beyond rest, over the capacity "
-        "along that axis alone. All axes and actuators are in the other sections."
+        "velocity is that of the unloaded piston at full spool. The check before the run leaves a reserve of it, and "
+        "of strokes and displacements (limits.valve_reserve and limits.stroke_reserve of the machine file). Unloading "
+        "is the loss of a bearing actuator's force, from rest to its least chamber pressure; forces and moments along "
+        "an axis are beyond rest, over the capacity along that axis alone. All axes and actuators are in the other "
+        "sections."
     )
     return [words, limit_table(uses)]
 

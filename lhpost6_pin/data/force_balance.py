@@ -4,11 +4,14 @@ The forces f_i of all actuators must add up to the required wrench, with b_i the
 
     sum_i b_i(t) f_i(t) = required(t) - sum_s b_s(t) f_s(t)       (`required_wrench`; f_s: pulls of the struts)
 
-It is compared on the average over a record, for the forces that bear the platen (vertical force, roll and pitch), and
+It is compared on the average over a record, for the actuators that bear the platen (vertical force, roll and pitch), and
 in bands of frequency for all. Friction is not known: Coulomb friction along every actuator and viscous friction along
-every axis, with free coefficients, are projected out. Axes are weighed so that a component counts as the least forces
-of the actuators that produce it alone. What is left is the quadratic form of a Gram matrix per axis, from which the
-remainder for any factors of the forces (another unit, another sign) follows.
+every axis, with free coefficients, are projected out. An axis is weighed so that its component of a wrench counts as
+the least forces of the actuators that produce it. What is left is the quadratic form of a Gram matrix per axis, from
+which the remainder for any factors of the forces (another unit, another sign) follows.
+
+Actuators that hardly act on each other's axes are judged apart (`actuator_groups`): noise of those that hold still does
+not count against those that move.
 """
 
 from collections.abc import Iterator
@@ -30,12 +33,20 @@ from .conditioning import integrate
 from .records import sample_interval
 from .signals import Band, differentiate
 
-__all__ = ["ForceBalance", "dynamic_balances", "static_balance"]
+__all__ = ["ActuatorGroup", "ForceBalance", "actuator_groups", "dynamic_balances", "static_balance"]
 
 VERTICAL = AXES.index("z")
 TILTS = (AXES.index("roll"), AXES.index("pitch"))
+COUPLED = 0.5  # of the largest wrench of a unit force on an axis, from which on an actuator acts on it
 FIRM = 0.1  # of a speed's deviation: below it friction is taken to rise with speed
 SAMPLES = 4.0  # a period at the end of a band: what is compared is band limited
+
+
+class ActuatorGroup(NamedTuple):
+    """Actuators that act on axes of their own."""
+
+    actuators: Mask  # (n_actuators,)
+    axes: Mask  # (n_axes,) of a plant's free ones
 
 
 class ForceBalance(NamedTuple):
@@ -45,23 +56,25 @@ class ForceBalance(NamedTuple):
     gram: Array  # (k, n + 1, n + 1) [N2] mean products of the actuators' shares, and last of what is required
     judged: Mask  # (n,) actuators that it can judge
 
-    def remainder(self, factor: Array, loaded: bool = False) -> tuple[Array, Array]:
-        """Mean squares [N2] of required less measured forces times `factor` (..., n), and of the required ones, (...).
+    @property
+    def required(self) -> float:
+        """Mean square of what is required [N2]."""
+        return float(np.sum(self.gram[:, -1, -1]))
 
-        With a load of unknown mass (`loaded`) what is required may be larger, on each axis by a factor of its own.
-        """
-        measured, needed = self.gram[:, :-1, :-1], self.gram[:, -1, -1]
-        square = np.einsum("...i,kij,...j->...k", factor, measured, factor)
-        common = factor @ self.gram[:, -1, :-1].T
-        larger = np.maximum(common / np.maximum(needed, 1e-300), 1.0) if loaded else np.ones_like(common)
-        left = square - 2.0 * larger * common + larger**2 * needed
-        return left.sum(axis=-1), (larger**2 * needed).sum(axis=-1)
+    def remainder(self, factor: Array) -> Array:
+        """Mean squares [N2] of required less measured forces times `factor` (..., n)."""
+        both = np.concatenate([factor, np.full((*factor.shape[:-1], 1), -1.0)], axis=-1)
+        return np.maximum(np.einsum("...i,kij,...j->...", both, self.gram, both, optimize=True), 0.0)
 
     def regression(self, factor: Array) -> tuple[float, float]:
         """Ratio of measured forces times `factor` (n,) to the required ones, and the share of them that these explain."""
         square = float(np.einsum("i,kij,j->", factor, self.gram[:, :-1, :-1], factor))
-        common, needed = float(np.sum(self.gram[:, -1, :-1] @ factor)), float(np.sum(self.gram[:, -1, -1]))
-        return common / max(needed, 1e-300), common**2 / max(needed * square, 1e-300)
+        common = float(np.sum(self.gram[:, -1, :-1] @ factor))
+        return common / max(self.required, 1e-300), common**2 / max(self.required * square, 1e-300)
+
+    def of(self, group: ActuatorGroup) -> "ForceBalance":
+        """The balance on the axes of a group, which judges its actuators."""
+        return self._replace(gram=self.gram[group.axes], judged=group.actuators)
 
 
 class _Wrenches(NamedTuple):
@@ -72,22 +85,35 @@ class _Wrenches(NamedTuple):
     dt: float
 
 
-def static_balance(plant: Plant, force: Array, upright: float, loaded: bool = False) -> ForceBalance | None:
-    """Mean `force` (n, n_actuators) [N] against weight and struts; None where the platen's guides bear it.
+def actuator_groups(plant: Plant) -> list[ActuatorGroup]:
+    """Actuators that act on the same axes, in the zero-position: on the LHPOST6 the horizontal and the vertical ones."""
+    path, _ = _shares(plant, _rest(), np.zeros((1, plant.spools)))
+    size = np.abs(path.column[0, : plant.spools][:, plant.axes])
+    part = size / np.maximum(size.max(axis=0), 1e-300)
+    acts = part >= np.minimum(COUPLED, part.max(axis=1, keepdims=True))
+    groups: list[ActuatorGroup] = []
+    left = np.ones(plant.spools, bool)
+    while left.any():
+        actuators = np.arange(plant.spools) == np.flatnonzero(left)[0]
+        for _ in range(plant.spools):
+            actuators = acts[:, acts[actuators].any(axis=0)].any(axis=1)
+        groups.append(ActuatorGroup(actuators, acts[actuators].any(axis=0)))
+        left &= ~actuators
+    return groups
 
-    Actuators whose cosine to the vertical is `upright` or more bear it; means of the others are small, held by friction.
-    A load of unknown mass (`loaded`) may stand off centre: vertical forces are compared alone. Raises SimulationError
-    for a coupled specimen.
+
+def static_balance(plant: Plant, force: Array, group: ActuatorGroup) -> ForceBalance | None:
+    """Mean `force` (n, n_actuators) [N] of the group that bears the platen, against weight and struts; None of others.
+
+    Means of other actuators are small, held by friction. Raises SimulationError for a coupled specimen.
     """
-    if VERTICAL not in plant.axes:
+    if VERTICAL not in plant.axes[group.axes]:
         return None
-    still = np.zeros((1, 6))
-    path, share = _shares(plant, PlatenMotion(still, still, still), force.mean(axis=0, keepdims=True))
-    bears = np.abs(path.column[0, : plant.spools, VERTICAL]) >= upright
-    free = [k for k, axis in enumerate(plant.axes) if axis == VERTICAL or (axis in TILTS and not loaded)]
-    at_rest = share[0][:, free]  # (n_actuators + 1, k)
-    at_rest[:-1][~bears] = 0.0
-    return ForceBalance("weight", np.einsum("ik,jk->kij", at_rest, at_rest), bears)
+    _, share = _shares(plant, _rest(), force.mean(axis=0, keepdims=True))
+    axes = group.axes & np.isin(plant.axes, (VERTICAL, *TILTS))
+    at_rest = share[0][:, axes]  # (n_actuators + 1, k)
+    at_rest[:-1][~group.actuators] = 0.0
+    return ForceBalance("weight", np.einsum("ik,jk->kij", at_rest, at_rest), group.actuators)
 
 
 def dynamic_balances(record: xr.Dataset, plant: Plant, force: Array, numbers: Parameters) -> Iterator[ForceBalance]:
@@ -115,6 +141,11 @@ def dynamic_balances(record: xr.Dataset, plant: Plant, force: Array, numbers: Pa
         share = (flat - base @ (base.T @ flat)).reshape(share.shape)
         gram = np.einsum("tik,tjk->kij", share, share) / len(share)
         yield ForceBalance("inertia", gram, np.ones(plant.spools, bool))
+
+
+def _rest() -> PlatenMotion:
+    """One sample of rest in the zero-position."""
+    return PlatenMotion(*np.zeros((3, 1, 6)))
 
 
 def _motion(record: xr.Dataset, bands: list[Band], agreement: float) -> PlatenMotion | None:

@@ -12,8 +12,8 @@ are not judged by inertia.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import combinations, permutations
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -25,7 +25,7 @@ from ..mechanics.payload import lock_joints
 from ..mechanics.actuator_forces import force_range, rest_forces
 from ..mechanics.plant import Plant, make_plant
 from .channels import columns_of
-from .force_balance import ForceBalance, dynamic_balances, static_balance
+from .force_balance import ForceBalance, actuator_groups, dynamic_balances, static_balance
 from .layout_faults import RecordFinding
 from .rests import rest_numbers
 
@@ -37,21 +37,21 @@ ALIKE = 1e-3  # of a logarithm: kN taken for N, and kip taken for lbf, are the s
 MOST_ENUMERATED = 10  # actuators of which all sets are tried; of more, singles, pairs, kinds, and kinds but for one
 
 
-@dataclass(frozen=True)
-class _Wrong:
+class _Wrong(NamedTuple):
     """Forces of a set of actuators and what would correct them."""
 
     actuators: tuple[str, ...]
-    ratio: float  # measured over required
     factor: float  # that corrects them; not a number: none that is known does
     by: str  # what requires it
+    ratio: float = math.nan  # measured over required, where no factor is known
 
 
 def wrong_forces(record: xr.Dataset, machine: Machine) -> list[RecordFinding]:
     """A warning for forces of a record of `machine` in another unit, an error for those with a turned sign.
 
     A size that no unit explains is a warning from `force_unit.factor` of `models/procedures/rests.toml`, either way.
-    With a specimen that the record states and the machine has not, forces may be larger than the machine requires.
+    With a specimen that the record states and the machine has not, forces may be larger than the machine requires, and
+    no unit is named.
     """
     if "actuator_force" not in record or set(record["actuator"].values.astype(str)) != set(machine.actuator_names):
         return []
@@ -65,7 +65,7 @@ def wrong_forces(record: xr.Dataset, machine: Machine) -> list[RecordFinding]:
 
 
 class _Search:
-    """Hypotheses on the forces of one record, in the order of their balances."""
+    """Hypotheses on the forces of one record, group by group of its actuators."""
 
     def __init__(self, record: xr.Dataset, plant: Plant) -> None:
         """Begin with all forces as they are."""
@@ -74,6 +74,9 @@ class _Search:
         labels = list(map(str, record["actuator"].values))
         self.force = columns_of(record["actuator_force"])[:, [labels.index(name) for name in self.names]]
         self.loaded = plant.machine.specimen is None and str(record.attrs.get("specimen", "none")) != "none"
+        span = force_range(plant)
+        due = span.middle + rest_forces(plant).share[0] * span.half
+        self.held = self.force.mean(axis=0) / np.where(due == 0.0, np.inf, due)  # mean forces over those of rest
         self.factor = np.ones(len(self.names))
         self.settled = np.zeros(len(self.names), bool)  # forces that are explained, or corrected
         kinds = [(a.area_a, a.area_b) for a in plant.machine.actuators]
@@ -81,89 +84,110 @@ class _Search:
 
     def run(self) -> Iterator[_Wrong]:
         """All that is wrong: signs of actuators that only push, means, then forces in motion."""
+        groups = actuator_groups(self.plant)
+        in_motion = list(dynamic_balances(self.record, self.plant, self.force, self.numbers))
+        for balance in (b.of(group) for group in groups for b in in_motion):
+            self._confirm(balance)
         yield from self._pulling()
-        static = static_balance(self.plant, self.force, self.numbers.number("balance.upright"), self.loaded)
-        if static is not None:
-            yield from self._judge([static])
-            left, needed = static.remainder(self.factor, self.loaded)
-            if left <= self.numbers.number("balance.closed") * needed:
-                self.settled |= static.judged
-        yield from self._judge(list(dynamic_balances(self.record, self.plant, self.force, self.numbers)))
+        for group in groups:
+            static = static_balance(self.plant, self.force, group)
+            if static is not None:
+                yield from self._judge([static])
+                if static.remainder(self.factor) <= self.numbers.number("rest_balance.closed") * static.required:
+                    self.settled |= static.judged
+        for group in groups:
+            yield from self._judge([b.of(group) for b in in_motion])
+
+    def _confirm(self, balance: ForceBalance) -> None:
+        """Settle the forces without which a balance that holds would be much worse."""
+        left = balance.remainder(self.factor)
+        without = balance.remainder(self.factor * (1.0 - np.eye(len(self.names))))
+        holds = left <= self.numbers.number("balance.share") * balance.required
+        self.settled |= balance.judged & holds & (without >= self.numbers.number("balance.confirmed") * left)
 
     def _pulling(self) -> Iterator[_Wrong]:
         """Signs of actuators with one chamber that pull on the average, by a share of what they push at rest."""
-        span, mean = force_range(self.plant), self.force.mean(axis=0)
-        due = span.middle + rest_forces(self.plant).share[0] * span.half
-        single = self.plant.actuators.area_b == 0.0
-        turned = single & (mean < 0.0) & (mean <= -self.numbers.number("balance.pulls") * np.abs(due))
+        single = (self.plant.actuators.area_b == 0.0) & ~self.settled
+        turned = single & (self.held <= -self.numbers.number("rest_balance.pulls"))
         if turned.any():
             self.factor[turned] = TURNED
-            yield _Wrong(tuple(self.names[turned]), float(np.mean(mean[turned] / due[turned])), TURNED, "weight")
+            yield _Wrong(tuple(self.names[turned]), TURNED, "weight")
 
     def _judge(self, balances: Sequence[ForceBalance]) -> Iterator[_Wrong]:
         """Hypotheses that hold in the balance, of several the one that closes best, one after the other."""
-        while open_balances := [b for b in balances if (b.judged & ~self.settled).any()]:
-            best = min((self._best(b) for b in open_balances), key=lambda one: one[0])
-            _, balance, those, factor = best
+        while unsettled := [b for b in balances if (b.judged & ~self.settled).any()]:
+            _, balance, those, factor = min((self._best(b) for b in unsettled), key=lambda one: one[0])
             if not those.any():
-                yield from self._unexplained(best[1])
+                yield from self._unexplained(balance)
                 return
             self.factor[those] *= factor
             self.settled |= those
-            gain, _ = balance.regression(self.factor)
-            yield _Wrong(tuple(self.names[those]), gain / factor, factor, balance.by)
+            yield _Wrong(tuple(self.names[those]), factor, balance.by)
 
     def _best(self, balance: ForceBalance) -> tuple[float, ForceBalance, Mask, float]:
         """Least share of the remainder, and the set of actuators with its factor; an empty set if none holds."""
-        sets = np.array(list(self._sets(balance.judged & ~self.settled)))  # (m, n)
-        share, margin, near = (self.numbers.number(f"balance.{key}") for key in ("share", "margin", "near"))
-        as_it_is, needed = balance.remainder(self.factor, self.loaded)
-        least = float(as_it_is / max(needed, 1e-300))
-        rows: list[tuple[float, bool, Mask, float]] = []
+        free = balance.judged & ~self.settled
+        sets = np.array(list(self._sets(free)))  # (m, n)
+        whole_kind = np.array([any(np.array_equal(one, kind & free) for kind in self.kinds) for one in sets])
+        at_rest = balance.by == "weight"
+        share, margin = (self.numbers.number(f"{'rest_' * at_rest}balance.{key}") for key in ("share", "margin"))
+        as_it_is, without = balance.remainder(self.factor), balance.remainder(np.where(sets, 0.0, self.factor))
+        opposes = np.sum(balance.gram[:, -1, :-1], axis=0) * self.factor < 0.0  # what is required
+        least, rows = float(as_it_is), []
         for factor in self._factors():
             changed = np.where(sets, factor * self.factor, self.factor)
-            left, whole = balance.remainder(changed, self.loaded)
-            without, _ = balance.remainder(np.where(sets, 0.0, self.factor), self.loaded)
-            least = min(least, float(np.min(left / np.maximum(whole, 1e-300))))
-            holds = (left <= share * whole) & (margin * left <= np.minimum(as_it_is, without))
-            if factor == TURNED:  # each of them opposes what is required
-                opposes = np.sum(balance.gram[:, -1, :-1], axis=0) * self.factor < 0.0
+            left = balance.remainder(changed)
+            least = min(least, float(np.min(left)))
+            holds = (left <= share * balance.required) & (margin * left <= np.minimum(as_it_is, without))
+            if factor == TURNED:
                 holds &= np.all(~sets | opposes, axis=1)
+            if at_rest:
+                holds &= self._plausible(sets, changed, factor) | whole_kind
             for k in np.flatnonzero(holds):
-                gain = 1.0 if self.loaded else balance.regression(changed[k])[0]
-                if 1.0 / near <= gain <= near:
-                    whole_kind = any(np.array_equal(sets[k], kind) for kind in self.kinds)
-                    rows.append((float(left[k]), whole_kind, sets[k], factor))
+                if self._near(balance, changed[k]):
+                    rows.append((float(left[k]), bool(whole_kind[k]), sets[k], factor))
+        least /= max(balance.required, 1e-300)
         if not rows:
             return least, balance, np.zeros(len(self.names), bool), 1.0
         most = self.numbers.number("balance.tie") * min(row[0] for row in rows)
         _, _, those, factor = min((row for row in rows if row[0] <= most), key=lambda row: (not row[1], row[0]))
         return least, balance, those, factor
 
+    def _plausible(self, sets: Mask, changed: Array, factor: float) -> Mask:
+        """Sets (m, n) whose mean forces, `changed` (m, n), are about those of rest, and no zero offset looks the same."""
+        near = self.numbers.number("rest_balance.near")
+        usual = np.all(~sets | (np.abs(np.log(np.maximum(changed * self.held, 1e-300))) <= math.log(near)), axis=1)
+        return usual & (factor < 1.0 or factor > self.numbers.number("rest_balance.offset"))
+
+    def _near(self, balance: ForceBalance, factor: Array) -> bool:
+        """Whether forces times `factor` (n,) are about as large as what is required."""
+        near = self.numbers.number("balance.near")
+        return 1.0 / near <= balance.regression(factor)[0] <= near
+
     def _sets(self, free: Mask) -> Iterator[Mask]:
         """Sets of the actuators that are free to be wrong."""
         which = np.flatnonzero(free)
-        sizes = range(1, len(which) + 1) if len(which) <= MOST_ENUMERATED else (1, 2)
-        for size in sizes:
+        every = len(which) <= MOST_ENUMERATED
+        for size in range(1, len(which) + 1) if every else (1, 2):
             for those in combinations(which, size):
                 yield np.isin(np.arange(len(free)), those)
-        if len(which) > MOST_ENUMERATED:
-            for kind in (free, *(kind & free for kind in self.kinds)):
-                yield kind
-                yield from (kind & (np.arange(len(free)) != k) for k in np.flatnonzero(kind))
+        for kind in () if every else (free, *(kind & free for kind in self.kinds)):
+            yield kind
+            yield from (kind & (np.arange(len(free)) != k) for k in np.flatnonzero(kind))
 
     def _factors(self) -> list[float]:
-        """Factors that correct forces: of exchanged units, and a turned sign; under an unknown load, larger ones."""
-        factors = [math.exp(value) for value in _unit_factors()]
-        return [k for k in factors if k > 1.0] if self.loaded else [TURNED, *factors]
+        """Factors that correct forces: a turned sign, and those of exchanged units; none under an unknown load."""
+        return [] if self.loaded else [TURNED, *(math.exp(value) for value in _unit_factors())]
 
     def _unexplained(self, balance: ForceBalance) -> Iterator[_Wrong]:
-        """A size far from what is required, of all forces that are not explained, where no hypothesis holds."""
+        """A size far from what is required, of all forces that are not settled, where no hypothesis holds."""
         ratio, explained = balance.regression(self.factor)
-        limit, least = self.numbers.number("force_unit.factor"), self.numbers.number("force_unit.explained")
-        doubted = explained >= least or balance.by == "weight"
-        if doubted and (ratio < 1.0 / limit or (ratio > limit and not self.loaded)):
-            yield _Wrong(tuple(self.names[balance.judged & ~self.settled]), abs(ratio), math.nan, balance.by)
+        limit, near = self.numbers.number("force_unit.factor"), self.numbers.number("balance.near")
+        doubted = explained >= self.numbers.number("force_unit.explained") or balance.by == "weight"
+        if doubted and (abs(ratio) < 1.0 / limit or (ratio > limit and not self.loaded)):
+            units = [k for k in self._factors() if k > 0.0 and 1.0 / near <= ratio * k <= near]
+            those = tuple(self.names[balance.judged & ~self.settled])
+            yield _Wrong(those, units[0] if len(units) == 1 else math.nan, balance.by, abs(ratio))
 
 
 def _unit_factors() -> dict[float, list[str]]:
@@ -187,15 +211,15 @@ def _exchanged(factor: float) -> str:
 
 
 def _finding(units: str, each: Sequence[_Wrong]) -> RecordFinding:
-    ratio, by = float(np.median([one.ratio for one in each])), " and ".join(dict.fromkeys(one.by for one in each))
+    by, ratio = " and ".join(dict.fromkeys(one.by for one in each)), 1.0 / each[0].factor
     names = ", ".join(dict.fromkeys(name for one in each for name in one.actuators))
     channel, verb = f"actuator_force[{names}]", f"require{'s' * (' and ' not in by)}"
     if units == "sign":
-        what = f"opposes what {by} {verb}: it is {ratio:.3g} times that"
-        return RecordFinding("error", channel, None, what, SIGN_REMEDY)
+        return RecordFinding("error", channel, None, f"is the negative of what {by} {verb}", SIGN_REMEDY)
     if units:
         size = f"1/{1.0 / ratio:.4g} of" if ratio < 1.0 else f"{ratio:.4g} times"
         remedy = "correct the unit in the channel map, and import again"
         return RecordFinding("warning", channel, None, f"are {size} what {by} {verb}: {units}?", remedy)
+    share = 100.0 * float(np.median([one.ratio for one in each]))
     remedy = "check the zero and the unit of these sensors, and whether a specimen was mounted"
-    return RecordFinding("warning", channel, None, f"are {100.0 * ratio:.3g} % of what {by} {verb}", remedy)
+    return RecordFinding("warning", channel, None, f"are {share:.3g} % of what {by} {verb}", remedy)

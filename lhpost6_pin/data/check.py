@@ -91,9 +91,12 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
         _inconsistent_forces(sound, machine),
         _floors_without_mass(sound, machine),
     )
-    units: list[RecordFinding] = []
+    forces: list[RecordFinding] = []
     if machine is not None and not errors:
-        errors, units = turned_signs(sound, machine), wrong_forces(sound, machine)
+        errors, forces = turned_signs(sound, machine), wrong_forces(sound, machine)
+        known_signs = {finding.channel for finding in errors}
+        errors += [f for f in forces if f.severity == "error" and f.channel not in known_signs]
+    units = [finding for finding in forces if finding.severity == "warning"]
     return errors + [RecordFinding("warning", *warning) for warning in warnings] + units + contents
 
 

@@ -4,8 +4,8 @@ The forces f_i of all actuators must add up to the required wrench, with b_i the
 
     sum_i b_i(t) f_i(t) = required(t) - sum_s b_s(t) f_s(t)       (`required_wrench`; f_s: pulls of the struts)
 
-It is compared on the average over a record, for the actuators that bear the platen (vertical force, roll and pitch), and
-in bands of frequency for all. Friction is not known: Coulomb friction along every actuator and viscous friction along
+It is compared on the average over a record, for the actuators that bear the platen (vertical force, roll and pitch),
+and in bands of frequency for all. Friction is not known: Coulomb friction along every actuator and viscous friction along
 every axis, with free coefficients, are projected out. An axis is weighed so that its component of a wrench counts as
 the least forces of the actuators that produce it. What is left is the quadratic form of a Gram matrix per axis, from
 which the remainder for any factors of the forces (another unit, another sign) follows.
@@ -67,7 +67,7 @@ class ForceBalance(NamedTuple):
         return np.maximum(np.einsum("...i,kij,...j->...", both, self.gram, both, optimize=True), 0.0)
 
     def regression(self, factor: Array) -> tuple[float, float]:
-        """Ratio of measured forces times `factor` (n,) to the required ones, and the share of them that these explain."""
+        """Ratio of measured forces times `factor` (n,) to the required ones, and the share of these explained."""
         square = float(np.einsum("i,kij,j->", factor, self.gram[:, :-1, :-1], factor))
         common = float(np.sum(self.gram[:, -1, :-1] @ factor))
         return common / max(self.required, 1e-300), common**2 / max(self.required * square, 1e-300)
@@ -78,7 +78,7 @@ class ForceBalance(NamedTuple):
 
 
 class _Wrenches(NamedTuple):
-    """Along a motion of n samples, each component over the size of the actuators' wrenches of unit forces on its axis."""
+    """Along a motion of n samples, each component over the size of the wrenches of unit forces on its axis."""
 
     share: Array  # (n, n_actuators + 1, n_axes) [N] of each actuator, and last of what is required
     friction: Array  # (n, ...) regressors without unit
@@ -86,7 +86,7 @@ class _Wrenches(NamedTuple):
 
 
 def actuator_groups(plant: Plant) -> list[ActuatorGroup]:
-    """Actuators that act on the same axes, in the zero-position: on the LHPOST6 the horizontal and the vertical ones."""
+    """Actuators that act on the same axes in the zero-position: of the LHPOST6 the horizontal and the vertical ones."""
     path, _ = _shares(plant, _rest(), np.zeros((1, plant.spools)))
     size = np.abs(path.column[0, : plant.spools][:, plant.axes])
     part = size / np.maximum(size.max(axis=0), 1e-300)

@@ -6,8 +6,9 @@ required but for a stated share, and where with the forces as they are, and with
 a stated multiple: friction that is not modelled may be removed with the forces, but not explained by their factor.
 Of hypotheses that do as well, that of a whole kind of actuators is taken.
 
-The mean forces that bear the platen are judged first, by its weight and the pull of the struts. Those that agree with it
-are not judged by inertia.
+Forces that motion confirms as they are, those without which a balance that holds would be much worse, are not doubted.
+Of the others, mean forces that bear the platen are judged first, by its weight and the pull of the struts, and those
+that do not agree with it then, or bear nothing, by inertia.
 """
 
 import math
@@ -21,8 +22,8 @@ import xarray as xr
 from ..core.arrays import Array, Mask
 from ..core.units import parse_unit, units_of
 from ..machine.machine import Machine
-from ..mechanics.payload import lock_joints
 from ..mechanics.actuator_forces import force_range, rest_forces
+from ..mechanics.payload import lock_joints
 from ..mechanics.plant import Plant, make_plant
 from .channels import columns_of
 from .force_balance import ForceBalance, actuator_groups, dynamic_balances, static_balance
@@ -61,7 +62,14 @@ def wrong_forces(record: xr.Dataset, machine: Machine) -> list[RecordFinding]:
     wrong: dict[str, list[_Wrong]] = {}
     for one in _Search(record, lock_joints(plant)).run():
         wrong.setdefault(_exchanged(one.factor), []).append(one)
-    return [_finding(units, each) for units, each in wrong.items()]
+    turned = [
+        RecordFinding(
+            "error", f"actuator_force[{name}]", None, f"is the negative of what {one.by} requires", SIGN_REMEDY
+        )
+        for one in wrong.pop("sign", [])
+        for name in one.actuators
+    ]
+    return turned + [_finding(units, each) for units, each in wrong.items()]
 
 
 class _Search:
@@ -128,7 +136,7 @@ class _Search:
         """Least share of the remainder, and the set of actuators with its factor; an empty set if none holds."""
         free = balance.judged & ~self.settled
         sets = np.array(list(self._sets(free)))  # (m, n)
-        whole_kind = np.array([any(np.array_equal(one, kind & free) for kind in self.kinds) for one in sets])
+        whole_kind = np.array([any(np.array_equal(one, kind) for kind in self.kinds) for one in sets])
         at_rest = balance.by == "weight"
         share, margin = (self.numbers.number(f"{'rest_' * at_rest}balance.{key}") for key in ("share", "margin"))
         as_it_is, without = balance.remainder(self.factor), balance.remainder(np.where(sets, 0.0, self.factor))
@@ -154,7 +162,7 @@ class _Search:
         return least, balance, those, factor
 
     def _plausible(self, sets: Mask, changed: Array, factor: float) -> Mask:
-        """Sets (m, n) whose mean forces, `changed` (m, n), are about those of rest, and no zero offset looks the same."""
+        """Sets (m, n) whose corrected mean forces (m, n) are about those of rest, and no zero offset looks the same."""
         near = self.numbers.number("rest_balance.near")
         usual = np.all(~sets | (np.abs(np.log(np.maximum(changed * self.held, 1e-300))) <= math.log(near)), axis=1)
         return usual & (factor < 1.0 or factor > self.numbers.number("rest_balance.offset"))
@@ -202,20 +210,23 @@ def _unit_factors() -> dict[float, list[str]]:
 
 
 def _exchanged(factor: float) -> str:
-    """Units of which one was taken for the other, that a factor corrects; "sign" of a turned one; empty if none does."""
+    """Units that were exchanged, as a factor corrects them; "sign" of a turned one; empty if none were."""
     if factor == TURNED:
         return "sign"
-    return next(
-        (" or ".join(pairs) for value, pairs in _unit_factors().items() if abs(math.log(factor) - value) < ALIKE), ""
-    ) if factor > 0.0 else ""
+    return (
+        next(
+            (" or ".join(pairs) for value, pairs in _unit_factors().items() if abs(math.log(factor) - value) < ALIKE),
+            "",
+        )
+        if factor > 0.0
+        else ""
+    )
 
 
 def _finding(units: str, each: Sequence[_Wrong]) -> RecordFinding:
     by, ratio = " and ".join(dict.fromkeys(one.by for one in each)), 1.0 / each[0].factor
     names = ", ".join(dict.fromkeys(name for one in each for name in one.actuators))
     channel, verb = f"actuator_force[{names}]", f"require{'s' * (' and ' not in by)}"
-    if units == "sign":
-        return RecordFinding("error", channel, None, f"is the negative of what {by} {verb}", SIGN_REMEDY)
     if units:
         size = f"1/{1.0 / ratio:.4g} of" if ratio < 1.0 else f"{ratio:.4g} times"
         remedy = "correct the unit in the channel map, and import again"

@@ -5,9 +5,9 @@ The forces f_i of all actuators must add up to the required wrench, with b_i the
     sum_i b_i(t) f_i(t) = required(t) - sum_s b_s(t) f_s(t)       (`required_wrench`; f_s: pulls of the struts)
 
 It is compared on the average over a record, for the actuators that bear the platen (vertical force, roll and pitch),
-and in bands of frequency for all. Friction is not known: Coulomb friction along every actuator and viscous friction along
-every axis, with free coefficients, are projected out. An axis is weighed so that its component of a wrench counts as
-the least forces of the actuators that produce it. What is left is the quadratic form of a Gram matrix per axis, from
+and in bands of frequency for all. Friction is not known: Coulomb friction along every actuator and viscous friction
+along every axis, with free coefficients, are projected out. An axis is weighed so that its component of a wrench counts
+as the least forces of the actuators that produce it. What is left is the quadratic form of a Gram matrix per axis, from
 which the remainder for any factors of the forces (another unit, another sign) follows.
 
 Actuators that hardly act on each other's axes are judged apart (`actuator_groups`): noise of those that hold still does

@@ -126,7 +126,7 @@ class _Search:
         while unsettled := [b for b in balances if (b.judged & ~self.settled).any()]:
             _, balance, those, factor = min((self._best(b) for b in unsettled), key=lambda one: one[0])
             if not those.any():
-                yield from self._unexplained(balance)
+                yield from self._unexplained(max(unsettled, key=lambda b: self._regression(b)[1]))
                 return
             self.factor[those] *= factor
             self.settled |= those
@@ -187,9 +187,13 @@ class _Search:
         """Factors that correct forces: a turned sign, and those of exchanged units; none under an unknown load."""
         return [] if self.loaded else [TURNED, *(math.exp(value) for value in _unit_factors())]
 
+    def _regression(self, balance: ForceBalance) -> tuple[float, float]:
+        """Ratio and share of what is required that the forces of the balance's own actuators explain."""
+        return balance.regression(self.factor * balance.judged)
+
     def _unexplained(self, balance: ForceBalance) -> Iterator[_Wrong]:
         """A size far from what is required, of all forces that are not settled, where no hypothesis holds."""
-        ratio, explained = balance.regression(self.factor)
+        ratio, explained = self._regression(balance)
         limit, near = self.numbers.number("force_unit.factor"), self.numbers.number("balance.near")
         doubted = explained >= self.numbers.number("force_unit.explained") or balance.by == "weight"
         if doubted and (abs(ratio) < 1.0 / limit or (ratio > limit and not self.loaded)):

@@ -21,11 +21,9 @@ from ..machine.recorded_changes import changes_summary
 from .alignment import hydraulic_force
 from .channels import LAYOUT, MOTION, channel_name, channel_unit, columns_of
 from .conditioning import resolution
-from .force_units import wrong_force_units
+from .force_units import wrong_forces
 from .layout_faults import RecordFinding, layout_faults
-from .mass_regression import mass_fits
 from .records import open_record, sample_interval
-from .rests import rest_numbers
 from .served_samples import judged_samples, served_findings
 from .signals import differentiate, lowpass_zero_phase
 from .turned_signs import turned_signs
@@ -93,10 +91,12 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
         _inconsistent_forces(sound, machine),
         _floors_without_mass(sound, machine),
     )
-    units: list[RecordFinding] = []
+    forces: list[RecordFinding] = []
     if machine is not None and not errors:
-        fits = mass_fits(sound, machine, rest_numbers())
-        errors, units = turned_signs(sound, machine, fits), wrong_force_units(sound, machine, fits)
+        errors, forces = turned_signs(sound, machine), wrong_forces(sound, machine)
+        known_signs = {finding.channel for finding in errors}
+        errors += [f for f in forces if f.severity == "error" and f.channel not in known_signs]
+    units = [finding for finding in forces if finding.severity == "warning"]
     return errors + [RecordFinding("warning", *warning) for warning in warnings] + units + contents
 
 

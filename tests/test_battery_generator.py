@@ -67,6 +67,7 @@ def test_the_platen_rings_on_its_oil_columns_at_the_known_frequencies():
     assert np.sort(modes[modes > 1])[3:] == pytest.approx([35, 37, 46], abs=0.6)
 
 
+@pytest.mark.slow
 def test_the_power_of_all_forces_is_the_rate_of_kinetic_energy():
     legs, platen = nominal()
     legs["seal"] = legs["pad"] = legs["viscous"] = 0.0
@@ -169,6 +170,7 @@ def test_a_table_drawn_anew_is_known_to_its_lab_and_follows_its_motions(tmp_path
     assert np.ptp(factors) > 0.1 and 0.6 <= min(factors) <= max(factors) <= 1.5
 
 
+@pytest.mark.slow
 def test_of_a_third_of_the_sensors_nothing_is_recorded(tmp_path):
     rule, seen = cases.numbers()["left_out"], set()
     for seed in range(30):

@@ -746,6 +746,7 @@ def test_a_small_amplitude_is_not_at_the_bound_of_none(found):
         assert ("swivel_play_H1.half_play" in at_bounds(moved)) is ends
 
 
+@pytest.mark.slow
 def test_a_refined_fit_is_evaluated_until_it_settles(found, monkeypatch):
     """From numbers far off; the last evaluation of all derivatives lowers the objective by little."""
     search, left = found.search, []
@@ -825,6 +826,7 @@ def test_a_search_without_its_effects_is_its_refit(found, rubbing):
     assert "calibrated" in {quantity.evidence for quantity in fitted.quantities.values()}
 
 
+@pytest.mark.slow
 def test_a_residual_function_has_the_size_of_the_force_that_is_missing(found):
     """Of each test, in newtons: columns are whitened as residuals are."""
     search, size, waves = found.search, 2e4, 3.0
@@ -902,6 +904,7 @@ def test_a_step_to_a_machine_without_inertia_is_rejected(found, monkeypatch):
     assert len(steps) > 1 and objective_at(problem, after.x) < objective_at(problem, x) + fit.OVERSHOT
 
 
+@pytest.mark.slow
 def test_a_helper_that_is_not_needed_any_more_is_pruned(found):
     search = found.search
     helper = scored("asymmetric_friction", ("V1",), 50.0)

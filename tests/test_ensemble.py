@@ -178,6 +178,7 @@ def test_indices_of_a_linear_result_are_its_squared_coefficients():
     assert shares["a"].sure and shares["b"].sure and not any(shares[name].sure for name in "def")
 
 
+@pytest.mark.slow
 def test_a_result_that_follows_from_nothing_names_no_number():
     """At the stated confidence one of twenty such results names one; of ten, over three are improbable (1e-3)."""
     pytest.importorskip("SALib")
@@ -385,6 +386,7 @@ def test_a_dask_cluster_gives_the_same_file(sines, tmp_path):
 
 
 @pytest.mark.long
+@pytest.mark.slow
 def test_runs_that_stop_or_fail_are_rows_with_their_reason(tmp_path, monkeypatch):
     """A sine beyond the stroke stops on the way: its demand is kept up to there, its tracking is not."""
     far = {"name": "sine", "label": "far", "options": {"amplitude": 0.9, "period": 6.0, "cycles": 1.0}}

@@ -225,6 +225,7 @@ def test_validation_and_decomposition_predict_one_noise(loose):
 
 
 @pytest.mark.long
+@pytest.mark.slow
 def test_discover_names_the_backlash_and_nothing_else(loose):
     machine, campaign, sensors = loose
     found = discover(machine, campaign, sensors, hold_out=["middle"], phases=(1,), propose=False)

@@ -94,6 +94,7 @@ def test_a_slow_slide_meets_coulomb_friction_and_stribecks_fall_of_it():
         assert table.friction * s == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_energy_that_the_valve_brings_is_stored_or_lost():
     table = PLAIN._replace(viscous=1500.0, leakage=5e-12, exponent=1.3, null=0.004, overlap=0.01, lag=0.03)
     held = np.repeat([0.2, -0.3, 0.0], round(0.4 * RATE))  # powers have no kinks but at these steps and where v turns

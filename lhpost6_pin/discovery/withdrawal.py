@@ -118,10 +118,10 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     original is their residual before any effect, `after` that of the search's solution. The effect is compared with
     everything else refitted without it, in the residuals that its family shows in. It must gain there a share of
     what is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the squares in some
-    column by a share of those before any effect. Not so where parameters run to their bounds without it, or where
-    it gains most of what is expected, and is one of two of a family or explains a good part of what is beyond noise
-    there. One that the held-out tests do not excite, with an expected gain within chance, stays, but not on a table
-    with one actuator, which every test excites.
+    column by a share of those before any effect. Not so where parameters run to their bounds without it, where it
+    explains half of what is beyond noise there, or where it gains most of what is expected, and is one of two of a
+    family or explains a good part of that. One that the held-out tests do not excite, with an expected gain within
+    chance, stays, but not on a table with one actuator, which every test excites.
     """
     if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
         return None  # a sensor's error
@@ -133,15 +133,14 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     gain, expected = gain_on(held, before, after, rows)
     if not single and expected <= n("accept.chance"):
         return None
+    if gain < max(np.sqrt(2.0 * expected), n("accept.held_out") * expected):
+        return Withdrawn(one.candidate.name, family.named, "held_out", gain=gain)
     first, old, new = (squares_by_column(at.whitened)[rows] for at in (original, before, after))
-    if gain >= max(np.sqrt(2.0 * expected), n("accept.held_out") * expected) and (
-        lowers_squares(first, old, new, n("accept.of_first"))
-        or is_absorbed(one.candidate, absorbing(less))
-        or (
-            gain >= n("accept.expected") * expected
-            and (_is_one_of_two(found, one) or share_explained(held, *both, family, found.numbers) >= n("accept.most"))
-        )
-    ):
+    if lowers_squares(first, old, new, n("accept.of_first")) or is_absorbed(one.candidate, absorbing(less)):
+        return None
+    share = share_explained(held, *both, family, found.numbers)
+    as_expected = gain >= n("accept.expected") * expected
+    if share >= n("accept.half") or (as_expected and (_is_one_of_two(found, one) or share >= n("accept.most"))):
         return None
     return Withdrawn(one.candidate.name, family.named, "held_out", gain=gain)
 

@@ -536,6 +536,7 @@ def test_a_program_is_checked_about_the_pose_in_which_it_would_run_not_about_the
     assert table.engine.status.base == (0.2, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_a_platen_that_trips_on_its_way_is_held_and_its_present_demand_is_live(machine):
     """Parked with an interlock that is lowered on the way; Reset leaves it there, Raise or Park goes on."""
     table = Table(machine, parked=True)
@@ -565,6 +566,7 @@ def test_a_platen_that_trips_on_its_way_is_held_and_its_present_demand_is_live(m
     assert table.engine.status.platen == "raised" and table.engine.trip == ""
 
 
+@pytest.mark.slow
 def test_interlocks_that_would_trip_park_raise_or_high_pressure_are_named_before(machine):
     """120 mm of 127 mm where it is parked; such a move takes a tenth of the velocity limit of z."""
     table = Table(machine, parked=True)

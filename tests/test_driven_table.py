@@ -516,6 +516,86 @@ def test_the_platen_is_parked_or_raised_at_every_pressure(machine):
     assert low.engine.status.platen == "parked"
 
 
+def test_a_program_is_checked_about_the_pose_in_which_it_would_run_not_about_the_parked_platen(machine, orders):
+    table = Table(machine, parked=True)
+    table.do("pressure", to="high")
+    table.do("park")
+    orders.program = sine()
+    status = table.engine.status
+    assert (status.platen, status.setpoint[2]) == ("moving", machine.platen.parked)
+    message = {"axis": "x", "value": 0.1}
+    try:
+        assert orders.of("span", message, status)["value"] == 0.1
+        with pytest.raises(OutOfRangeError, match="z displacement 120 mm"):  # a setpoint there stays refused
+            orders.of("span", message, status._replace(base=status.setpoint))
+    finally:
+        orders.program = None
+    table.do("raise")
+    table.step(6.5)
+    table.do("setpoint", axis=0, value=0.2)
+    assert table.engine.status.base == (0.2, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.slow
+def test_a_platen_that_trips_on_its_way_is_held_and_its_present_demand_is_live(machine):
+    """Parked with an interlock that is lowered on the way; Reset leaves it there, Raise or Park goes on."""
+    table = Table(machine, parked=True)
+    table.do("pressure", to="high")
+    table.do("raise")
+    table.step(2.5)
+    assert table.engine.status.platen == "moving"
+    table.do("interlock", name="displacement", limit=0.3)
+    table.step(0.01)
+    assert "displacement of z" in table.engine.trip and table.engine.status.platen == "held"
+    table.step(2.0)
+    share, place = table.of("shares")[-1], table.of("platen_displacement")[-1]
+    assert share[0] == pytest.approx(abs(place[2]) / machine.limits.displacement[2], rel=1e-9)
+    assert share[1] < 0.02 and share[5] == 0.0  # it stands, and nothing is commanded
+    with pytest.raises(ControllerError, match="still displacement of z"):
+        table.do("reset")
+    table.do("interlock", name="displacement", limit=0.99)
+    table.do("reset")
+    table.step(2.5)
+    assert table.engine.status.platen == "held" and table.engine.status.base == (0.0,) * 6
+    assert table.of("platen_displacement")[-1, 2] == pytest.approx(place[2], abs=1e-3)
+    table.do("load", sine())
+    with pytest.raises(ControllerError, match="held where it stopped; raise it first"):
+        table.do("run")
+    table.do("raise")
+    table.step(6.0)
+    assert table.engine.status.platen == "raised" and table.engine.trip == ""
+
+
+@pytest.mark.slow
+def test_interlocks_that_would_trip_park_raise_or_high_pressure_are_named_before(machine):
+    """120 mm of 127 mm where it is parked; such a move takes a tenth of the velocity limit of z."""
+    table = Table(machine, parked=True)
+    table.do("interlock", name="displacement", limit=0.5)
+    with pytest.raises(ControllerError, match="trips at 50 %; raise the displacement limit to at least 95 % first"):
+        table.do("pressure", to="high")
+    table.do("interlock", name="displacement", limit=0.95)
+    table.do("pressure", to="high")
+    table.do("interlock", name="velocity", limit=0.1)
+    with pytest.raises(ControllerError, match=r"velocity of z .* raise the velocity limit to at least 11 % first"):
+        table.do("raise")
+    table.do("interlock", name="velocity", limit=0.11)
+    assert table.engine.status.barred == ("", "")
+    table.do("raise")
+    table.step(7.0)
+    table.do("interlock", name="displacement", limit=0.5)
+    why = "displacement of z would reach 120 mm, 94.5 % of capacity, and the interlock trips at 50 %; "
+    why += "raise the displacement limit to at least 95 % first"
+    with pytest.raises(ControllerError) as caught:
+        table.do("park")
+    assert str(caught.value) == why == table.engine.status.barred[1] and table.engine.status.barred[0] == ""
+    table.do("interlock", name="displacement", on=False)
+    assert table.engine.status.barred == ("", "")
+    table.do("interlock", name="displacement", on=True, limit=0.95)  # what it says is enough
+    table.do("park")
+    table.step(7.0)
+    assert table.engine.status.platen == "parked" and table.engine.trip == ""
+
+
 # --------------------------------------------------------------------------------------------- rows
 @pytest.mark.fast
 def test_a_ring_hands_over_every_row_once_and_counts_those_that_it_loses(tmp_path):

@@ -356,6 +356,11 @@ def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
         await wait(tab, reads("platen-state", "raised"))
         await enter(tab, "span-x", "100")
         await wait(tab, reads("log", "sets the span of x to 100 mm"))
+        await enter(tab, "interlock-displacement", "50")
+        await wait(tab, "document.getElementById('park').title.includes('limit to at least 95 % first')")
+        assert await tab.evaluate("document.getElementById('park').disabled")
+        await enter(tab, "interlock-displacement", "100")
+        await wait(tab, "!document.getElementById('park').disabled")
         await choose_a_motion(tab)
         await press(tab, "record")
         await enter(tab, "frequency", "0.5")
@@ -371,6 +376,7 @@ def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
         )
         await tab.key("Escape")
         await wait(tab, "document.body.classList.contains('tripped')")
+        await wait(tab, reads("platen-state", "held"))
         sections = "[...document.querySelectorAll('section')].filter((box) => box.scrollWidth > box.clientWidth)"
         assert await tab.evaluate(f"{sections}.map((box) => box.textContent)") == []  # nothing beyond its box
         await press(tab, "reset")

@@ -74,7 +74,7 @@ export function forget() { // a connection that is lost takes a half-given order
 
 // ------------------------------------------------------------------------------------------------ what may be done
 function reasons() { // by id: why not, or ""
-  const { pressure, platen, trip, program, operator, recording, you } = state, busy = program.state !== "stopped";
+  const { pressure, platen, trip, program, operator, recording, you, barred } = state, busy = program.state !== "stopped";
   const mine = you.role === "operator" ? "" : operator ? `you are watching: ${operator} has the controls` : "take control first";
   const tripped = trip ? "tripped: reset first" : "", parked = platen === "parked" || trip || !hello.parks ? "" : "park the platen first";
   const raised = tripped || (pressure !== "high" ? "high pressure first" : platen === "moving" ? "the platen is moving" : platen !== "raised" ? "raise the platen first" : "");
@@ -84,8 +84,8 @@ function reasons() { // by id: why not, or ""
     "pressure-off": mine || (pressure === "off" ? "pressure is off" : pressure === "high" ? "low pressure first" : ""),
     "pressure-low": mine || (pressure === "low" ? "pressure is low" : pressure === "off" ? tripped : parked),
     "pressure-high": mine || (pressure === "high" ? "pressure is high" : pressure === "off" ? "low pressure first" : tripped),
-    raise: mine || tripped || (pressure !== "high" ? "high pressure first" : platen === "raised" ? "already raised" : platen === "moving" ? "the platen is moving" : waiting),
-    park: mine || tripped || (platen === "parked" ? "already parked" : platen === "moving" ? "the platen is moving" : busy ? "stop the program first" : waiting),
+    raise: mine || tripped || (pressure !== "high" ? "high pressure first" : platen === "raised" ? "already raised" : platen === "moving" ? "the platen is moving" : waiting || barred.raise),
+    park: mine || tripped || (platen === "parked" ? "already parked" : platen === "moving" ? "the platen is moving" : busy ? "stop the program first" : waiting || barred.park),
     trip: trip ? "already tripped" : "", // anybody may
     reset: mine || (trip ? "" : "not tripped"),
     run: mine || raised || waiting || (program.state === "running" ? "running" : program.state === "stopping" ? "stopping" : busy ? "" : amiss()),
@@ -103,11 +103,13 @@ function reasons() { // by id: why not, or ""
   };
 }
 function upNext() { // the id of what comes next, and the step in words
-  const { pressure, platen, trip, program, operator, you } = state;
+  const { pressure, platen, trip, program, operator, you, barred } = state;
   if (trip) return ["reset", `Tripped: ${trip}. ${you.role === "operator" ? "Remove the cause, then Reset." : ""}`];
   if (you.role !== "operator") return operator ? ["", `You are watching: ${operator} has the controls.`] : ["take", "Nobody has the controls. Enter your name and Take control."];
   if (pressure === "off") return ["pressure-low", "Next: Low pressure opens the session with the plant."];
   if (pressure === "low") return ["pressure-high", "Next: High pressure, the controller takes over."];
+  if (platen === "held") return ["raise", `The platen is held where it stopped. ${barred.raise ? `Before Raise: ${barred.raise}.` : "Next: Raise or Park."}`];
+  if (platen === "parked" && barred.raise) return ["", `Before Raise: ${barred.raise}.`];
   if (platen === "parked") return ["raise", "Next: Raise the platen to its zero position."];
   if (platen === "moving") return ["", "The platen is moving, please wait."];
   if (waits()) return ["", `Checking ${waits()} against the capacity of the table. Run waits until it is loaded; Stop cancels.`];

@@ -18,6 +18,8 @@ from .programs import Program
 
 __all__ = ["Drive", "DriveState"]
 
+_PEAK = 1.875  # peak over mean velocity of a move from rest to rest
+
 
 class DriveState(NamedTuple):
     """What runs: state and time of the program, and whether the setpoint is reached."""
@@ -65,11 +67,19 @@ class Drive:
 
     def _approach(self, now: Moved, sample: int) -> None:
         """Move to the setpoint from the motion `now` (6,) each."""
-        way = np.abs(self.setpoint - now.value)
+        seconds = self._seconds(np.abs(self.setpoint - now.value))
+        self._place = move_to(self.setpoint, sample / SAMPLE_RATE, seconds, now)
+
+    def _seconds(self, way: Array) -> float:
+        """Duration of a move over ways (6,) from rest to rest."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            seconds = np.nan_to_num(1.875 * way / self._speed, posinf=0.0).max()  # peak over mean velocity of a move
-        longest = max(float(seconds), self._numbers.number("setpoint.shortest"))
-        self._place = move_to(self.setpoint, sample / SAMPLE_RATE, longest, now)
+            seconds = np.nan_to_num(_PEAK * way / self._speed, posinf=0.0).max()
+        return max(float(seconds), self._numbers.number("setpoint.shortest"))
+
+    def approach_velocity(self, setpoint: Array, place: Array) -> Array:
+        """Peak velocity (6,) [m/s, rad/s] of a move to a setpoint (6,) from rest at a place (6,) [m, rad]."""
+        way = np.abs(setpoint - place)
+        return _PEAK * way / self._seconds(way)
 
     def set_span(self, span: Array, sample: int) -> None:
         """Take new spans (6,) of the axes."""

@@ -35,7 +35,7 @@ class Status(NamedTuple):
     """What a panel shows of the controller beside the rows of samples."""
 
     pressure: str  # low or high
-    platen: str  # parked, moving or raised
+    platen: str  # parked, moving, raised, or held where it stopped
     trip: str  # empty: none
     program: str | None
     state: str
@@ -48,6 +48,8 @@ class Status(NamedTuple):
     where: tuple[str, ...]
     number: int = 0  # of the choice that loaded the program
     tripped_at: int = 0  # sample of the trip, if any
+    base: tuple[float, ...] = (0.0,) * 6  # setpoint about which a program would run [m, rad]
+    barred: tuple[str, str] = ("", "")  # why interlocks forbid to raise and to park from rest; empty: they do not
 
 
 class Engine:
@@ -70,7 +72,9 @@ class Engine:
         free = np.isin(np.arange(6), plant.axes)
         self._speed = np.where(free, limits.velocity, np.inf)
         self._speed[self._speed == 0.0] = np.inf
-        self._tolerance = numbers.number("raised.tolerance") * max(limits.displacement[2], 1e-3)
+        self._margin = numbers.number("raised.tolerance")
+        self._tolerance = self._margin * max(limits.displacement[2], 1e-3)
+        self._places = {"raised": np.zeros(6), "parked": np.array([0.0, 0.0, self._parked or 0.0, 0.0, 0.0, 0.0])}
         self._reference = Reference(Drive(numbers, self._speed, np.zeros(6)), self._controller.drive_for)
         self.pressure, self.trip, self._tripped_at = "low", "", 0
         self._number = 0
@@ -97,8 +101,8 @@ class Engine:
         do = str(order.get("do"))
         actions: dict[str, Callable[[Mapping[str, Any]], None]] = {
             "pressure": self._pressure,
-            "raise": lambda _: self._lift("raised", np.zeros(6)),
-            "park": lambda _: self._lift("parked", np.array([0.0, 0.0, self._parked or 0.0, 0.0, 0.0, 0.0])),
+            "raise": lambda _: self._lift("raised"),
+            "park": lambda _: self._lift("parked"),
             "setpoint": self._setpoint,
             "span": lambda o: self._drive.set_span(_with_axis(self._drive.span, o), self._next),
             "scale": lambda o: self._drive.set_scale(float(o["value"]), self._next),
@@ -118,6 +122,8 @@ class Engine:
     def trip_by(self, reason: str) -> None:
         """Stop commanding, and end the program; the first reason stays."""
         if not self.trip and self.pressure == "high":
+            if self.platen == "moving":
+                self._place = "held"
             self.trip, self._tripped_at = reason, self._last
             self._reference.changed()
             self._drive.take_over(self._now.displacement, self._last)
@@ -127,19 +133,31 @@ class Engine:
         if to == "high":
             _refuse(bool(self.trip), "the table has tripped; reset it first")
             if self.pressure != "high":
+                barrier = self._interlocks.barrier(self._start, np.zeros(6), 0.0)
+                _refuse(bool(barrier), barrier)
                 self._start_at_place()
-                self._place = "parked" if self._near(self._parked) else "raised"
+                self._place = self._standing
         elif self.pressure == "high" and not self.trip:
             _refuse(not self._free, "a program runs; stop it first")
             _refuse(self._parked is not None and self.platen != "parked", "the platen is not parked; park it first")
         self.pressure = to
 
-    def _lift(self, place: str, setpoint: Array) -> None:
+    def _lift(self, place: str) -> None:
         self._ready()
         _refuse(self._parked is None, "this table is not parked: it stands in its zero position")
         _refuse(not self._free, "a program runs; stop it first")
+        barrier = self._barrier(place)
+        _refuse(bool(barrier), barrier)
         self._place, self._lifted = place, False
-        self._drive.move_setpoint(setpoint, self._next)
+        self._drive.move_setpoint(self._places[place], self._next)
+
+    def _barrier(self, place: str) -> str:
+        """Why interlocks forbid to go from here to a place; empty: they do not, or there is no such place."""
+        if self._parked is None:
+            return ""
+        to, now = self._places[place], self._start
+        largest = np.maximum(np.abs(to), np.abs(now))
+        return self._interlocks.barrier(largest, self._drive.approach_velocity(to, now), self._margin)
 
     def _setpoint(self, order: Mapping[str, Any]) -> None:
         self._ready(raised=True)
@@ -172,7 +190,10 @@ class Engine:
             raise ControllerError(f"still {self._interlocks.reason(at, self._last / SAMPLE_RATE)}; raise that limit")
         self.trip = ""
         self._start_at_place()
-        self._drive.move_setpoint(self._drive.setpoint, self._last)
+        if self._place != "raised":  # on from here only by another order
+            self._place = self._standing
+        held = self._place != "raised"
+        self._drive.move_setpoint(self._start if held else self._drive.setpoint, self._last)
 
     def _interlock(self, order: Mapping[str, Any]) -> None:
         at = INTERLOCKS.index(str(order["name"]))
@@ -198,24 +219,39 @@ class Engine:
     def _ready(self, raised: bool = False) -> None:
         _refuse(self.pressure != "high", "the pressure is not high; raise it first")
         _refuse(bool(self.trip), "the table has tripped; reset it first")
-        _refuse(raised and self._place == "parked", "the platen is parked; raise it first")
+        stands = "held where it stopped" if self._place == "held" else "parked"
+        _refuse(raised and self._place != "raised", f"the platen is {stands}; raise it first")
 
     def _start_at_place(self) -> None:
         """Take the platen over where it is."""
-        place = np.where(np.isfinite(self._speed), self._now.displacement, 0.0)
+        place = self._start
         self._memory = self._controller.init_at(place, self._now.force)
         self._drive.take_over(place, self._last)
         self._interlocks.begin()
         self._reference.clear()
+
+    @property
+    def _start(self) -> Array:
+        """Where the free axes of the platen are (6,) [m, rad]."""
+        return np.where(np.isfinite(self._speed), self._now.displacement, 0.0)
+
+    @property
+    def _standing(self) -> str:
+        """Where a platen that is not moved stands: parked, raised, or held where it stopped on the way."""
+        if self._near(self._parked):
+            return "parked"
+        return "raised" if self._place == "raised" else "held"
 
     def _near(self, height: float | None) -> bool:
         return height is not None and bool(abs(self._now.displacement[2] - height) < self._tolerance)
 
     @property
     def platen(self) -> str:
-        """Whether the platen is parked, raised, or moving from one to the other."""
-        if self.pressure != "high":
-            return "parked" if self._near(self._parked) else "raised"
+        """Whether the platen is parked, raised, moving from one to the other, or held where it stopped."""
+        if self.trip:
+            return "parked" if self._near(self._parked) else "held"
+        if self.pressure != "high" or self._place == "held":
+            return self._standing
         settled = self._drive.state(self._last).settled
         if self._place == "parked":
             return "parked" if settled and self._near(self._parked) else "moving"
@@ -240,6 +276,8 @@ class Engine:
                 command = np.empty(len(self._command))
                 step_packed(k, inputs, *reading.sensors, *self._packed, self._memory, command)
                 self._command = command
+        else:  # to be shown; nothing is commanded that could saturate
+            self._interlocks.look(now, np.zeros(len(self._command)))
         self._answered = reading, wanted
         return command
 
@@ -259,10 +297,11 @@ class Engine:
     @property
     def status(self) -> Status:
         """State at the last sample."""
-        drive, look = self._drive.state(self._last), self._interlocks
+        drive, look, platen = self._drive.state(self._last), self._interlocks, self.platen
+        moves = not self.commanding or platen == "moving" or not self._free
         return Status(
             self.pressure,
-            self.platen,
+            platen,
             self.trip,
             drive.program,
             drive.state,
@@ -275,6 +314,8 @@ class Engine:
             tuple(look.where(i) for i in range(len(INTERLOCKS))),
             self._number,
             self._tripped_at,
+            tuple(map(float, self._drive.setpoint if self._place == "raised" else self._places["raised"])),
+            ("", "") if moves else (self._barrier("raised"), self._barrier("parked")),
         )
 
     def _fill(self, reading: Reading, wanted: Moved | None) -> None:

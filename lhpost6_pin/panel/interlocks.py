@@ -5,6 +5,7 @@ rest over what remains of its range; moment of all actuators about the level axe
 along that axis; time during which a spool command is at its limit without a break, over the time stated.
 """
 
+import math
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -135,6 +136,27 @@ class Interlocks:
         _look(now.numbers, command, self._tables, full, self._longest, *state)
         over = (self.shares > self.limit) & self.on
         return int(over.argmax()) if over.any() else None
+
+    def barrier(self, displacement: Array, velocity: Array, margin: float) -> str:
+        """Why an intended motion would trip, and what to do first; empty if it would not.
+
+        Largest magnitudes of the motion by axis (6,) [m, rad] and [m/s, rad/s]; `margin`: share of capacity [1] by
+        which what is measured may be beyond them.
+        """
+        for i, largest in enumerate((displacement, velocity)):
+            shares = np.abs(largest) * self._tables[0][i]
+            at = int(shares.argmax())
+            needed = float(shares[at]) + margin
+            if shares[at] == 0.0 or not self.on[i] or self.limit[i] >= needed:
+                continue
+            name, percent = INTERLOCKS[i], math.ceil(100.0 * needed - 1e-9)
+            unit = place_unit(AXES[at]) + _PER[name]
+            return (
+                f"{name} of {AXES[at]} would reach {in_page_units(float(abs(largest[at])), unit, 4)}, "
+                f"{100.0 * shares[at]:.1f} % of capacity, and the interlock trips at {100.0 * self.limit[i]:g} %; "
+                f"raise the {name} limit to at least {percent} % first"
+            )
+        return ""
 
     def where(self, i: int) -> str:
         """Axis or actuator of an interlock's largest share."""

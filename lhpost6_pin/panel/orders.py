@@ -86,7 +86,7 @@ class Orders:
             wanted, most = in_page_units(value, place_unit(axis)), in_page_units(limit, place_unit(axis))
             raise ControllerError(f"{do} of {axis}: {wanted}; the limit is {most}")
         if self.program is not None and self.program.by_span:
-            both = {"span": np.array(status.span), "setpoint": np.array(status.setpoint)}
+            both = {"span": np.array(status.span), "setpoint": np.array(status.base)}
             both[do][at] = value
             check_program(self._plant, self.program, both["span"], both["setpoint"])
         what = f"sets the {do} of {axis} to {in_page_units(value, place_unit(axis))}"
@@ -94,7 +94,7 @@ class Orders:
 
     def _scale(self, value: float, status: Status) -> dict[str, Any]:
         if self.program is not None and not self.program.by_span:
-            check_program(self._plant, self.program, np.full(6, value), np.array(status.setpoint))
+            check_program(self._plant, self.program, np.full(6, value), np.array(status.base))
         return {"do": "scale", "value": value, "what": f"sets the scale of the motion to {value:g}"}
 
     def _wave(self, message: Mapping[str, Any], status: Status) -> tuple[dict[str, Any], Program]:
@@ -106,7 +106,7 @@ class Orders:
         still = [AXES[k] for k in axes if status.span[k] == 0.0]
         if still:
             raise ControllerError(f"the span of {', '.join(still)} is zero; set one first")
-        check_program(self._plant, wave, np.array(status.span), np.array(status.setpoint))
+        check_program(self._plant, wave, np.array(status.span), np.array(status.base))
         return {"wave": wave, "what": f"loads {wave.name} on {', '.join(AXES[k] for k in axes)}"}, wave
 
     def _motion(
@@ -116,7 +116,7 @@ class Orders:
         own = None if self._machine.motion == "free" else self._machine.motion
         target = make_target(motion_of(name, []), axes=axes or own, rate=float(SAMPLE_RATE))
         program = Recorded(target.reference.motion, target.displacement, target.velocity, target.acceleration)
-        check_program(self._plant, program, np.full(6, scale), np.array(status.setpoint))
+        check_program(self._plant, program, np.full(6, scale), np.array(status.base))
         file = self._folder / f"motion-{number}.npy"
         np.save(file, np.stack([target.displacement, target.velocity, target.acceleration]))
         what = f"loads {program.name} at scale {scale:g}"

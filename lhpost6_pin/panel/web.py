@@ -200,6 +200,7 @@ class PanelServer:
             "link": session.link_state(),
             "pressure": status.pressure if status else "off",
             "platen": status.platen if status else "unknown",
+            "barred": dict(zip(("raise", "park"), status.barred if status else ("", ""), strict=True)),
             "trip": (status and status.trip) or None,
             "setpoint": status.setpoint if status else (0.0,) * 6,
             "span": status.span if status else (0.0,) * 6,

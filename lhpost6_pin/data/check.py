@@ -24,6 +24,7 @@ from .conditioning import resolution
 from .force_units import wrong_forces
 from .layout_faults import RecordFinding, layout_faults
 from .records import open_record, sample_interval
+from .repeated_columns import repeated_columns
 from .served_samples import judged_samples, served_findings
 from .signals import differentiate, lowpass_zero_phase
 from .turned_signs import turned_signs
@@ -85,6 +86,7 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
     by_column = (_implausible_unit, _starts_in_motion, _saturated_spool, _frozen, _spike)
     warnings = chain(
         served_findings(dataset),
+        repeated_columns(sound),
         (warning for judge in by_column for c in columns if (warning := judge(c))),
         _odd_rates(sound),
         _inconsistent_motion(sound),

@@ -49,7 +49,7 @@ def repeated_columns(record: xr.Dataset) -> Iterator[_Warning]:
                 found.add(other)
                 sided = "" if sign == turned else ", but for the sign"
                 what = f"is the same as {one} at every sample{sided}: one column of the file for two channels?"
-                yield other, None, what, "correct the column in the channel map, and import again"
+                yield other, None, what, "correct the column of the wrong one in the channel map, and import again"
 
 
 def _differ(one: str, other: str) -> bool:

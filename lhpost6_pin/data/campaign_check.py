@@ -16,6 +16,7 @@ from .noise_levels import noise_levels
 from .observable import Observable, observable
 from .records import is_measured
 from .sensors import SensorSet, load_sensors, make_sensors
+from .turned_displacement import turned_displacement
 
 __all__ = ["CampaignCheck", "check_campaign", "contradicting_sensors"]
 
@@ -69,10 +70,11 @@ class CampaignCheck:
 def check_campaign(machine: Machine, records: Sequence[xr.Dataset], sensors: str | None = None) -> CampaignCheck | None:
     """Check the measured records of this machine together; None if there is none.
 
+    Axes of a displacement that is turned against the others are turned back first: they are errors of the record.
     Sensors, by name or file, are by default those that the machine file names, else as the records show them. Raises
     what `load_sensors` does.
     """
-    measured = [r for r in records if is_measured(r) and _of(machine, r)]
+    measured = [turned_displacement(r, machine)[1] for r in records if is_measured(r) and _of(machine, r)]
     if not measured:
         return None
     plant, levels = make_plant(machine), noise_levels(measured)

@@ -19,13 +19,16 @@ from ..core.names import AXES
 from ..machine.machine import Machine
 from ..machine.recorded_changes import changes_summary
 from .alignment import hydraulic_force
-from .channels import LAYOUT, MOTION, channel_name, channel_unit, columns_of
+from .channels import LAYOUT, channel_name, channel_unit, columns_of
 from .conditioning import resolution
 from .force_units import wrong_forces
 from .layout_faults import RecordFinding, layout_faults
+from .motion_pairs import GAIN_TOLERANCE, inconsistent_motion
 from .records import open_record, sample_interval
+from .repeated_columns import repeated_columns
 from .served_samples import judged_samples, served_findings
-from .signals import differentiate, lowpass_zero_phase
+from .signals import lowpass_zero_phase
+from .turned_displacement import turned_displacement
 from .turned_signs import turned_signs
 
 __all__ = ["check_dataset", "check_record"]
@@ -39,18 +42,6 @@ SPIKE_NOISE = 20.0  # standard deviations of the roughness: below this a spike a
 RESOLUTION_STEPS = 8  # as many of a channel's smallest steps count as movement
 UNRELATED, FOLLOWS = 0.5, 0.95  # correlations of force and pressures: below, noise or another actuator's; the same
 MOVES = 0.5  # share of the largest variation of its kind from which a force must follow its pressures
-GAIN_TOLERANCE = 0.1  # between a channel and the derivative of another; calibration errors are far smaller
-LIKE_AXES = tuple((j, k) for k in range(6) for j in range(6) if j // 3 == k // 3)  # of one unit
-USUAL_FACTORS = {  # gain of a channel over what it should be -> likely reason
-    -1.0: "opposite signs",
-    1 / 9.80665: "in g",
-    1e3: "in mm",
-    1 / 0.0254: "in inches",
-    180 / np.pi: "in degrees",
-    1e-3: "the other in mm",
-    0.0254: "the other in inches",
-    np.pi / 180: "the other in degrees",
-}
 LIKELY_UNITS = {  # unit: least and greatest plausible peak, and the likely mistake outside
     "m": (0.0, 3.0, "mm or in for m"),
     "rad": (0.0, 1.0, "deg for rad"),
@@ -83,19 +74,25 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
     judged = judged_samples(dataset)
     columns = tuple(c for c in _columns(sound, known, judged) if not _held(c, machine))
     by_column = (_implausible_unit, _starts_in_motion, _saturated_spool, _frozen, _spike)
+    as_recorded = sound
+    turned: list[RecordFinding] = []
+    signs: list[RecordFinding] = []
+    forces: list[RecordFinding] = []
+    if not errors:
+        turned, sound = turned_displacement(as_recorded, machine)
+    if machine is not None and not errors:
+        signs, forces = turned_signs(sound, machine), wrong_forces(sound, machine)
     warnings = chain(
         served_findings(dataset),
+        repeated_columns(as_recorded),
         (warning for judge in by_column for c in columns if (warning := judge(c))),
         _odd_rates(sound),
-        _inconsistent_motion(sound),
+        inconsistent_motion(sound),
         _inconsistent_forces(sound, machine),
         _floors_without_mass(sound, machine),
     )
-    forces: list[RecordFinding] = []
-    if machine is not None and not errors:
-        errors, forces = turned_signs(sound, machine), wrong_forces(sound, machine)
-        known_signs = {finding.channel for finding in errors}
-        errors += [f for f in forces if f.severity == "error" and f.channel not in known_signs]
+    known_signs = {finding.channel for finding in signs}
+    errors += turned + signs + [f for f in forces if f.severity == "error" and f.channel not in known_signs]
     units = [finding for finding in forces if finding.severity == "warning"]
     return errors + [RecordFinding("warning", *warning) for warning in warnings] + units + contents
 
@@ -268,49 +265,6 @@ def _odd_rates(dataset: xr.Dataset) -> Iterator[_Warning]:
 
 
 # -------------------------------------------------------------------------------------------- consistency
-def _inconsistent_motion(dataset: xr.Dataset) -> Iterator[_Warning]:
-    """Compare each of displacement, velocity and acceleration with the derivative of those before it."""
-    dt = sample_interval(dataset)
-    if dataset.sizes["time"] < 256 or dataset.sizes["time"] * dt < 2:
-        return
-    cutoff = min(40.0, 0.2 / dt)
-    for low, high in ((0, 1), (1, 2), (0, 2)):
-        if not {MOTION[low], MOTION[high]} <= set(dataset.data_vars):
-            continue
-        expected = dataset[MOTION[low]].values
-        for _ in range(high - low):
-            expected = differentiate(expected, dt, cutoff)
-        found = lowpass_zero_phase(dataset[MOTION[high]].values, dt, cutoff)
-        gains = {(j, k): _coherent_gain(expected[:, j], found[:, k], dt) for j, k in LIKE_AXES}
-        for (j, k), gain in gains.items():
-            right = gain is not None and abs(gain - 1) <= GAIN_TOLERANCE
-            place, source = channel_name(dataset[MOTION[high]], k), channel_name(dataset[MOTION[low]], j)
-            if j == k and gain is not None and not right:
-                reason = next((f" ({why}?)" for g, why in USUAL_FACTORS.items() if abs(gain / g - 1) < 0.1), "")
-                yield place, None, f"is {gain:.3g} times that derived from {source}{reason}", "check unit and sign"
-            elif j != k and right and gains[k, k] is None:
-                yield place, None, f"is the derivative of {source}", "the two channels may be swapped"
-
-
-def _coherent_gain(expected: Array, found: Array, dt: float) -> float | None:
-    """Median gain found / expected where the two are coherent; None if that is almost nowhere.
-
-    Its sign is that of the lower half of these frequencies, where a delay turns the phase least.
-    """
-    from scipy.signal import csd, welch
-
-    each = {"fs": 1 / dt, "nperseg": int(min(len(found) // 4, round(2 / dt)))}
-    if each["nperseg"] < 10:
-        return None  # no five frequencies above zero
-    f, cross = csd(expected, found, **each)
-    ours, theirs = welch(expected, **each)[1], welch(found, **each)[1]
-    band = (f > 0) & (f < 20) & (ours > 1e-4 * ours.max()) & (np.abs(cross) ** 2 > 0.95 * ours * theirs)
-    if band.sum() < 5:
-        return None
-    ratio = cross[band] / ours[band]
-    return float(np.copysign(np.median(np.abs(ratio)), np.median(ratio[: len(ratio) // 2].real)))
-
-
 def _inconsistent_forces(dataset: xr.Dataset, machine: Machine | None) -> Iterator[_Warning]:
     """Compare forces with the chamber pressures where these vary beyond noise.
 

@@ -174,6 +174,7 @@ def test_a_margin_that_pays_for_a_wider_band_is_stated_and_the_card_compares_the
     words = (
         "For a band at least a tenth wider the margin is smaller than before in x: gain margin 25.7 dB before, 9.5 dB"
     )
+    assert tuning_entries(wider)["axes"]["x"]["traded"] == wider.axes[0].traded != ()
     (sentence,) = trades(tuning)
     assert sentence.startswith(words) and "y:" not in sentence
     print_tuning(wider)

@@ -8,7 +8,8 @@ import pytest
 from run_cases import driven
 
 from lhpost6_pin.core.errors import OutOfRangeError
-from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.core.files import models_folder
+from lhpost6_pin.core.names import AXES, SAMPLE_RATE
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.actuator_forces import rest_forces, unit_shares
 from lhpost6_pin.mechanics.capacity import capacity_table, flow_readings, payload_table
@@ -232,6 +233,28 @@ def test_another_machine_has_a_capacity_of_its_own_numbers(name, value):
     lines = {line.name: line for line in capacity_table(load_machine("uniaxial"))}
     assert lines[name].model == pytest.approx(value, rel=1e-5)
     assert payload_table(load_machine("uniaxial")) == flow_readings(load_machine("uniaxial")) == ()
+
+
+def test_a_specimen_is_compared_with_the_payload_of_table_2_2_only_if_it_is_that_payload(tmp_path):
+    """0.55 m/s downwards with 4.9 MN and 1.6 g along X; a block that is heavier or aside has only its strokes."""
+    machine = load_machine()
+    block = (models_folder() / "specimens" / "block_4_9MN.toml").read_text()
+    heavy = tmp_path / "heavy.toml"
+    heavy.write_text(block.replace("499660.9", "510000.0"))
+    payload = {line.name: line for line in capacity_table(machine.with_specimen("block_4_9MN"))}
+    assert payload["peak velocity z down"].printed == 0.55 and payload["peak velocity roll"].printed is None
+    assert payload["peak velocity z down"].deviation == pytest.approx(-0.333, abs=1e-3)
+    assert payload["peak acceleration X"].printed == pytest.approx(1.6 * 9.80665, rel=1e-6)
+    for other in (
+        machine.with_specimen("block_4_9MN", (0.5, 0.0, 0.0)),
+        machine.with_specimen(heavy),
+        machine.with_specimen("pendulum"),
+        load_machine("uniaxial").with_specimen("block_4_9MN"),
+    ):
+        stated = [line.name for line in capacity_table(other) if line.printed is not None]
+        assert stated == [f"peak displacement {AXES[k]}" for k in other.axes]
+    slow = {line.name: line.printed for line in capacity_table(machine.with_specimen("block_4_9MN"), 1)}
+    assert slow["peak velocity z down"] is None and slow["peak force Z down"] == 4.3e6  # of all servovalves
 
 
 def test_the_command_prints_the_capacity_of_a_table_without_table_2_2(lhpost6):

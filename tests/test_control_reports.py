@@ -19,7 +19,7 @@ from lhpost6_pin.show.report.iterate_plots import compare
 from lhpost6_pin.show.report.iterate_report import target_demands, write_iterate_report
 from lhpost6_pin.show.report.scales import decibels, degrees
 from lhpost6_pin.show.report.sine_report import write_sine_report
-from lhpost6_pin.show.report.tune_report import write_tune_report
+from lhpost6_pin.show.report.tune_report import headlines, trades, write_tune_report
 from lhpost6_pin.show.result_tables import print_tuning
 from lhpost6_pin.show.results import tuning_entries
 from lhpost6_pin.tuning.iterate import identify_inverse, iterate
@@ -161,6 +161,30 @@ def test_a_tuning_that_falls_short_says_where(tmp_path, machine, settings, chang
     assert not NO_NUMBER.search(Reader(page).words)
 
 
+def test_a_margin_that_pays_for_a_wider_band_is_stated_and_the_card_compares_the_smallest_margins(
+    tmp_path, capsys, machine, settings
+):
+    """Of two axes, the one with the smallest margin afterwards had a large one: the other's was the smallest before."""
+    known = {"margin_before": Margin(19.3, 45.0, 1.51, 1.0), "margin_after": Margin(3.0, 48.0, 1.0, 5.0)}
+    wider = make_tuning(machine, settings, **known, band_before=(0.0625, 30.0))
+    other = replace(
+        wider.axes[0], axis="y", margin_before=Margin(1.22, 9.0, 0.2, 5.0), margin_after=Margin(4.0, 9.0, 1.0, 5.0)
+    )
+    tuning = replace(wider, axes=(*wider.axes, other))
+    words = (
+        "For a band at least a tenth wider the margin is smaller than before in x: gain margin 25.7 dB before, 9.5 dB"
+    )
+    assert tuning_entries(wider)["axes"]["x"]["traded"] == wider.axes[0].traded != ()
+    (sentence,) = trades(tuning)
+    assert sentence.startswith(words) and "y:" not in sentence
+    print_tuning(wider)
+    assert words in " ".join(capsys.readouterr().out.split())
+    page = Reader(write_tune_report(wider, tmp_path / "t.html"))
+    assert page.verdict[0] == "good" and words in page.verdict[1]
+    (card,) = (one for one in headlines(tuning) if one.label == "Smallest gain margin")
+    assert "axis x" in card.note and card.note.endswith(f"smallest before: {decibels(1.22)}, axis y")
+
+
 def test_a_margin_that_pays_for_a_wider_band_or_hardly_changes_is_no_loss(machine, settings):
     """Before: no band at all, a narrower band, or margins as after within what is judged a loss."""
     known = {"margin_before": Margin(19.3, 45.0, 1.51, 1.0)}
@@ -169,6 +193,9 @@ def test_a_margin_that_pays_for_a_wider_band_or_hardly_changes_is_no_loss(machin
         assert tuning.axes[0].worse == () and tuning_entries(tuning)["axes"]["x"]["worse"] == ()
     near = {"band_before": (0.0625, 41.0), "margin_before": Margin(4.2, 48.0, 1.02, 5.0)}
     assert make_tuning(machine, settings, **near).axes[0].worse == ()
+    traded = make_tuning(machine, settings, **known, band_before=(0.0625, 30.0)).axes[0].traded
+    assert traded == ("gain margin 25.7 dB before, 12.0 dB after", "phase margin 87 deg before, 57 deg after")
+    assert make_tuning(machine, settings, **known).axes[0].traded == ()  # no band before
     both = {"band_before": (0.0625, 40.0), "margin_after": Margin(np.inf, np.nan, np.inf, np.nan)}
     assert make_tuning(machine, settings, **both).axes[0].worse == ()
 

@@ -260,7 +260,7 @@ def test_a_drafted_table_runs_before_it_is_tuned(lhpost6, tmp_path):
     [
         (("--motion", "sideways"), "--motion 'sideways' is not one of free, x"),
         (("--cylinder", "none"), "--cylinder 'none' is not one of double-rod, single-rod"),
-        (("--motion", "free", "--length", "0.1 m"), "do not reach the platen"),
+        (("--motion", "free", "--length", "0.1 m"), "do not reach the platen; give at least 0.3"),
         (("--motion", "z", "--mass", "9 t"), "88.26 kN to be carried"),
     ],
 )
@@ -268,6 +268,30 @@ def test_machines_that_cannot_be_are_refused_and_leave_no_file(lhpost6, tmp_path
     assert refused(lhpost6("new-machine", "it", *options(KNOWN), *more), words)
     assert refused(lhpost6("new-machine", "no name", *options(KNOWN)), "use letters, digits and underscores")
     assert not list(tmp_path.glob("*.toml"))
+
+
+def test_legs_of_a_length_that_is_not_stated_reach_and_a_stated_one_is_refused_with_the_least_that_does():
+    """A table of 2 t with a stroke of 125 mm: legs of six times that, 0.75 m, have joints 0.974 m apart in plan."""
+    known = {"mass": "2 t", "area": "20 cm2", "stroke": "125 mm", "supply_pressure": "210 bar"}
+    machine = draft_machine("it", read_answers(known), motion="free")
+    for leg in machine.actuators:
+        along = np.subtract(leg.platen_point, leg.base_point)
+        assert np.hypot(*along[:2]) == pytest.approx(0.974, abs=1e-3)
+        assert np.linalg.norm(along) == pytest.approx(1.4 * np.hypot(*along[:2]), rel=1e-4)
+    with pytest.raises(ParameterError, match=r"--length 0\.75 m: .* 0\.974\d* m apart") as refusal:
+        draft_machine("it", read_answers({**known, "length": "0.75 m"}), motion="free")
+    least = float(re.search(r"at least ([\d.]+) m", str(refusal.value)).group(1))
+    for length, reaches in ((least, True), (least - 2e-3, False)):
+        assert ("do not reach" not in refused_length(known, length)) is reaches
+
+
+def refused_length(known, length):
+    """What a draft with legs of a length [m] is refused for; empty if it is not."""
+    try:
+        draft_machine("it", read_answers({**known, "length": f"{length} m"}), motion="free")
+    except ParameterError as error:
+        return str(error)
+    return ""
 
 
 def test_two_numbers_that_determine_the_same_are_refused_and_leave_no_file(lhpost6, tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -51,6 +52,31 @@ def test_the_scale_that_fits_is_a_factor_on_a_test_with_a_scale_of_its_own(machi
     check_campaign(machine, tests=("EQ",), scale=fits)  # three digits, rounded down
     with pytest.raises(OutOfRangeError, match="EQ: "):
         check_campaign(machine, tests=("EQ",), scale=1.02 * fits)
+
+
+def test_what_more_flow_admits_is_stated_as_a_scale_of_the_campaign(machine):
+    """EQ is Ridgecrest at 0.5; horizontal valves are exceeded at 2.5 of it, and within their flow with both open."""
+    with pytest.raises(OutOfRangeError, match="actuator velocity") as found:
+        check_campaign(machine, tests=("TZ", "EQ"), scale=2.5)
+    words = re.search(r"--valves 2, .*? the largest scale of the campaign is ([\d.]+)\.", str(found.value))
+    both, fits = machine.with_valves(2), float(words.group(1))
+    assert fits > 2.5 > found.value.largest_scale and str(found.value).count("With ") == 2
+    check_campaign(both, tests=("TZ", "EQ"), scale=fits)
+    with pytest.raises(OutOfRangeError) as found:
+        check_campaign(both, tests=("TZ", "EQ"), scale=1.02 * fits)
+    assert "--valves" not in str(found.value)
+
+
+def test_the_command_opens_the_valves_that_its_refusal_proposes(lhpost6, tmp_path, monkeypatch):
+    def simulated(table, *_, **__):
+        raise SimulationError(
+            f"open: {[actuator.valves for actuator in table.actuators if actuator.area_b is not None]}"
+        )
+
+    monkeypatch.setattr(module, "simulate_campaign", simulated)
+    asked = ("campaign", "--tests", "TZ", "--out", tmp_path / "c")
+    for more, valves in (((), "[1, 1, 1, 1]"), (("--valves", "2"), "[2, 2, 2, 2]")):
+        assert refused(lhpost6(*asked, *more), f"open: {valves}")
 
 
 def test_a_test_is_checked_as_far_as_it_is_run(machine, monkeypatch):

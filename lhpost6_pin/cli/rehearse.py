@@ -166,6 +166,7 @@ def campaign(
     sensors: opt.SensorsName = None,
     tests: Annotated[str | None, typer.Option(help="Tests of the campaign, such as TX,WN; default: all.")] = None,
     scale: Annotated[float, typer.Option(help="Scale factor of all motions, e.g. for a smaller table.")] = 1.0,
+    valves: opt.Valves = 0,
     beyond: opt.Beyond = False,
     errors: Annotated[bool, typer.Option(help="Draw random gains, offsets and skews of the sensors.")] = True,
     seed: Annotated[int, typer.Option(min=0, help="Seed of sensor noise and sensor errors.")] = 0,
@@ -178,7 +179,7 @@ def campaign(
     from ..show.check_tables import campaign_entries, print_tests
     from ..simulation.simulated_campaign import check_campaign, simulate_campaign
 
-    table = machine.load()
+    table = machine.load(valves)
     named = sensors or table.sensors
     if not named:
         log.warning("%s names no sensors file: tests are recorded with the noise of the LHPOST6's sensors", table.name)

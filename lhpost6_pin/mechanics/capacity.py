@@ -8,6 +8,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.names import AXES
 from ..machine.machine import Machine
+from ..machine.parameters import Parameters
 from ..machine.strength import stated_strength
 from ..machine.structure import FLOW_READINGS
 from .actuator_forces import axis_capacity, force_range
@@ -22,6 +23,12 @@ __all__ += ["actuator_speeds", "axis_speeds", "axis_travel", "with_all_valves"]
 
 ALL_VALVES = 2
 """Servovalves of a horizontal actuator of the LHPOST6, all open in Table 2.2."""
+
+DIGITS = 0.01
+"""Half the last digit of the printed 4.9 MN, over it."""
+
+CENTRED = 0.01
+"""Distance in plan [m] of a centre of gravity from C up to which it counts as centred."""
 
 PER = {"m": "m/s", "rad": "rad/s"}
 
@@ -65,8 +72,9 @@ def capacity_table(machine: Machine, valves: int = 0) -> tuple[Capacity, ...]:
     """Peak forces, accelerations, velocities and strokes with what is mounted, beside what the machine file states.
 
     Table 2.2 where the file has it, with all servovalves open as there, else its section `limits`. With a number of
-    `valves` open the velocities are those of so many. Forces and accelerations with a specimen, and velocities with
-    fewer servovalves than in Table 2.2, have nothing stated beside them.
+    `valves` open the velocities are those of so many. With a specimen the columns of the payload are beside forces,
+    accelerations and velocities if it is that payload, else nothing is, as beside velocities with fewer servovalves
+    than in Table 2.2.
     """
     plant, printed = lock_joints(make_plant(machine)), has_printed_capacity(machine)
     open_valves = machine.with_valves(valves) if valves else with_all_valves(machine)
@@ -84,14 +92,7 @@ def payload_table(machine: Machine) -> tuple[Capacity, ...]:
         return ()
     bare = machine.with_valves(ALL_VALVES)
     plant = with_payload(make_plant(bare), par.number("table_2_2_payload.weight"))
-    x, y, down = par.vector("table_2_2_payload.acceleration")
-    actuators = par.vector("table_2_2_payload.acceleration_actuators")
-    stated = {f"peak acceleration {name}": actuators[k] for k, name in enumerate(("X", "Y", "Z up"))}
-    stated |= {"peak acceleration X, reaction mass": x, "peak acceleration Y, reaction mass": y}
-    stated |= {"peak acceleration Z down": down, "peak force Z down": par.number("table_2_2_payload.force_down")}
-    stated["peak acceleration Z up, platen"] = par.number("table_2_2_payload.acceleration_up")
-    velocity = par.vector("table_2_2_payload.velocity")
-    stated |= {f"peak velocity {AXES[k]}": velocity[k] for k in range(2)} | {"peak velocity z down": velocity[2]}
+    stated = _stated_with_payload(par)
     rows = [*_forces(plant), *_accelerations(plant), *_speeds_of(plant)]
     return tuple(row._replace(printed=stated[row.name]) for row in rows if row.name in stated)
 
@@ -122,8 +123,36 @@ def flow_readings(machine: Machine) -> tuple[FlowReading, ...]:
     return tuple(rows)
 
 
+def _stated_with_payload(par: Parameters) -> dict[str, float]:
+    """What the machine file states with the payload of Table 2.2, by the names of the rows."""
+    x, y, down = par.vector("table_2_2_payload.acceleration")
+    actuators = par.vector("table_2_2_payload.acceleration_actuators")
+    stated = {f"peak acceleration {name}": actuators[k] for k, name in enumerate(("X", "Y", "Z up"))}
+    stated |= {"peak acceleration X, reaction mass": x, "peak acceleration Y, reaction mass": y}
+    stated |= {"peak acceleration Z down": down, "peak force Z down": par.number("table_2_2_payload.force_down")}
+    stated["peak acceleration Z up, platen"] = par.number("table_2_2_payload.acceleration_up")
+    velocity = par.vector("table_2_2_payload.velocity")
+    stated |= {f"peak velocity {AXES[k]}": velocity[k] for k in range(2)} | {"peak velocity z down": velocity[2]}
+    return stated
+
+
+def _is_stated_payload(machine: Machine) -> bool:
+    """Whether the specimen is the payload of Table 2.2: rigid, centred, and of its weight to the digits printed."""
+    par, plant = machine.parameters, make_plant(machine)
+    if "table_2_2_payload.weight" not in par or plant.flexible:
+        return False
+    bare = make_plant(machine.without_specimen())
+    loaded, own = plant.model.inertias[1], bare.model.inertias[1]
+    mass = loaded.mass - own.mass
+    weight = par.number("table_2_2_payload.weight")
+    if abs(mass * machine.platen.gravity / weight - 1.0) > DIGITS:
+        return False
+    aside = (loaded.mass * loaded.lever - own.mass * own.lever) / mass - plant.body[0]["rho_c"]
+    return bool(np.hypot(*aside[:2]) < CENTRED)
+
+
 def _stated(machine: Machine) -> dict[str, float]:
-    """What the machine file states of the bare table, by the names of the rows."""
+    """What the machine file states of the table with what is mounted, by the names of the rows."""
     limits = machine.limits
     found: dict[str, float] = {}
     for k in machine.axes:
@@ -134,7 +163,8 @@ def _stated(machine: Machine) -> dict[str, float]:
         name = axis.upper() if k < 3 else axis
         found[f"peak acceleration {name}{' down' if axis == 'z' else ''}"] = limits.acceleration[k]
     if machine.specimen is not None:
-        return {name: value for name, value in found.items() if "acceleration" not in name}
+        found = {name: value for name, value in found.items() if "displacement" in name}
+        return found | (_stated_with_payload(machine.parameters) if _is_stated_payload(machine) else {})
     if has_printed_capacity(machine):
         par = machine.parameters
         for what in ("force", "acceleration"):

@@ -31,7 +31,7 @@ from .report.interface_section import interface_table
 from .report.iterate_report import iterate_verdict, iteration_tables, target_demands
 from .report.page import Table
 from .report.sine_report import sine_table, sine_verdict
-from .report.tune_report import losses, measuring_doubts, specimen_limits, tuning_tables
+from .report.tune_report import losses, measuring_doubts, specimen_limits, trades, tuning_tables
 from .report.validate_machine import drift_blocks
 from .report.validate_report import validation_notes, validation_verdict
 from .report.validate_sections import summary_blocks
@@ -55,7 +55,7 @@ def print_tuning(tuning: Tuning) -> None:
     stable = "stable" if tuning.doubled else "unstable"
     doubled = f"With all master gains doubled, without dry friction: {stable}"
     before = [] if tuning.was_stable else [f"Unstable with the settings before, {tuning.before.name}"]
-    remarks = *specimen_limits(tuning), *losses(tuning), *measuring_doubts(tuning)
+    remarks = *specimen_limits(tuning), *losses(tuning), *trades(tuning), *measuring_doubts(tuning)
     print_blocks(*before, *tuning_tables(tuning), changed, *limits, doubled, *remarks)
 
 

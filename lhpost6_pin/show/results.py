@@ -135,7 +135,7 @@ def tuning_entries(found: "Tuning") -> Entries:
     for one in found.axes:
         chosen = {name: values[AXES.index(one.axis)] for name, values in _picked(found.after, *gains).items()}
         axes[one.axis] = {
-            **_picked(one, *names, "limited_by", "limited_by_specimen", "worse", "doubt"),
+            **_picked(one, *names, "limited_by", "limited_by_specimen", "worse", "traded", "doubt"),
             "gains": chosen,
         }
     return {

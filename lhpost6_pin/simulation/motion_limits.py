@@ -17,6 +17,7 @@ import xarray as xr
 from ..core.arrays import Array
 from ..core.errors import OutOfRangeError
 from ..core.names import AXES
+from ..machine.machine import Machine
 from ..machine.strength import stated_strength
 from ..machine.structure import FLOW_READINGS
 from ..mechanics.capacity import with_all_valves
@@ -26,27 +27,56 @@ from ..mechanics.pose import PlatenMotion
 from ..motions import LimitsSummary, MotionLimits, Peak, Reference, Target, check_limits, largest_scale, limit_peaks
 from ..motions.limits import SI, Units
 
-__all__ = ["Judgement", "check_motion_limits", "fitting_scale", "judge_motion", "judge_record"]
-__all__ += ["refuse_blocked_axes"]
+__all__ = ["FLOW", "FlowRemedy", "Judgement", "check_motion_limits", "fitting_scale", "flow_remedies", "judge_motion"]
+__all__ += ["judge_record", "refuse_blocked_axes"]
+
+FLOW = "actuator velocity"
+"""Name of the limit that the flow of valves sets."""
 
 
-def check_motion_limits(plant: Plant, target: Target, units: Units = SI) -> LimitsSummary:
+def check_motion_limits(plant: Plant, target: Target, units: Units = SI, *, remedies: bool = True) -> LimitsSummary:
     """Demand of a target over the capacity of a plant, by limit, with texts in `units`.
 
     Raises OutOfRangeError that names each limit exceeded and the largest scale that fits; where the flow of valves is
-    exceeded, also the scale with all servovalves open and that by the other reading of Eq. 4-2. For a guided machine
-    also where the target moves an axis that is not free.
+    exceeded, with `remedies` also the scale with all servovalves open and that by the other reading of Eq. 4-2. For a
+    guided machine also where the target moves an axis that is not free.
     """
     refuse_blocked_axes(plant, target)
     bounds = _axis_limits(plant)
     try:
         return check_limits(target, bounds, make_motion_check(plant), units)
     except OutOfRangeError as error:
-        if "actuator velocity" not in error.exceeded:
+        if not remedies or FLOW not in error.exceeded:
             raise
-        least = error.largest_scale
-        ways = _with_more_valves(plant, target, least), _by_other_reading(plant, target, least)
-        raise OutOfRangeError(f"{error}{''.join(ways)}", least, error.exceeded) from None
+        least, words = error.largest_scale, [str(error)]
+        for remedy in flow_remedies(plant.machine):
+            fits = fitting_scale(make_plant(remedy.machine), target)
+            if least is None or fits > least:  # else other limits govern
+                words.append(f"{remedy.words} the largest scale is {fits:g}")
+        raise OutOfRangeError(". ".join(words), least, error.exceeded) from None
+
+
+class FlowRemedy(NamedTuple):
+    """A machine whose valves admit more flow, and how it comes about, as the beginning of a sentence."""
+
+    words: str
+    machine: Machine
+
+
+def flow_remedies(machine: Machine) -> list[FlowRemedy]:
+    """All servovalves open, unless they are, and the other reading of Eq. 4-2."""
+    (other,) = (word for word in FLOW_READINGS if word != machine.flow_reading)
+    reading = f'With the other reading of Eq. 4-2 (machine.flow_reading = "{other}")'
+    found = [FlowRemedy(reading, machine.with_flow_reading(other))]
+    every = with_all_valves(machine)
+    pairs = zip(machine.actuators, every.actuators, strict=True)
+    opened = [full for now, full in pairs if full.valves > now.valves]
+    if opened:
+        kind, count = opened[0].kind, opened[0].valves
+        valves = "both servovalves" if count == 2 else f"all {count} servovalves"
+        option = f"--valves {count}, or {kind}.valves = {count} in an override"
+        found.insert(0, FlowRemedy(f"With {valves} of each {kind} actuator open ({option})", every))
+    return found
 
 
 def refuse_blocked_axes(plant: Plant, target: Target) -> None:
@@ -122,30 +152,3 @@ def _axis_limits(plant: Plant) -> MotionLimits:
     rise = stated_strength(plant.machine.parameters).rise
     stated = six(limits.displacement), six(limits.velocity), six(limits.acceleration)
     return MotionLimits(*stated, rise if math.isfinite(rise) else None, limits.stroke_reserve)
-
-
-def _with_more_valves(plant: Plant, target: Target, least: float | None) -> str:
-    """The scale that fits with all servovalves open, as a sentence; empty if they are, or it is not above `least`."""
-    machine = with_all_valves(plant.machine)
-    pairs = zip(plant.machine.actuators, machine.actuators, strict=True)
-    opened = [full for now, full in pairs if full.valves > now.valves]
-    if not opened:
-        return ""
-    fits = fitting_scale(make_plant(machine), target)
-    if least is not None and fits <= least:  # other limits govern
-        return ""
-    kind, count = opened[0].kind, opened[0].valves
-    every = "both servovalves" if count == 2 else f"all {count} servovalves"
-    return (
-        f". With {every} of each {kind} actuator open (--valves {count}, or {kind}.valves = {count} in an override) "
-        f"the largest scale is {fits:g}"
-    )
-
-
-def _by_other_reading(plant: Plant, target: Target, least: float | None) -> str:
-    """The scale that fits by the other reading of Eq. 4-2, as a sentence; empty if it is not above `least`."""
-    (other,) = (word for word in FLOW_READINGS if word != plant.machine.flow_reading)
-    fits = fitting_scale(make_plant(plant.machine.with_flow_reading(other)), target)
-    if least is not None and fits <= least:  # other limits govern
-        return ""
-    return f'. With the other reading of Eq. 4-2 (machine.flow_reading = "{other}") the largest scale is {fits:g}'

@@ -29,7 +29,7 @@ from ..machine.parameters import Parameters, load_parameters
 from ..mechanics.plant import make_plant
 from ..mechanics.pose import PlatenMotion
 from ..motions import Target, find_motion, make_target
-from .motion_limits import check_motion_limits
+from .motion_limits import FLOW, check_motion_limits, fitting_scale, flow_remedies
 from .outputs import record_of_run
 from .simulate import ClosedLoop, fastest_engine, simulate
 from .trouble import with_pressure_trouble
@@ -55,7 +55,8 @@ def check_campaign(
     """Compare the tests of a procedure (or some of them) with the limits of the machine, each as far as it is run.
 
     Raises OutOfRangeError that names every test beyond them with the limits exceeded, and the largest scale of the
-    campaign, three digits, with which all of its tests fit; UnknownNameError as `simulate_campaign`.
+    campaign, three digits, with which all of its tests fit; where the flow of valves is exceeded, also the scales of
+    the campaign with `flow_remedies`. UnknownNameError as `simulate_campaign`.
     """
     numbers, plant = load_procedure(procedure), make_plant(machine)
     clauses: list[str] = []
@@ -63,7 +64,8 @@ def check_campaign(
     fits = float("inf")
     for test in _chosen(numbers, tests):
         try:
-            check_motion_limits(plant, _as_run(numbers, test, _target(numbers, test, machine, scale)))
+            target = _as_run(numbers, test, _target(numbers, test, machine, scale))
+            check_motion_limits(plant, target, remedies=False)  # their scales would be those of a motion
         except OutOfRangeError as error:
             if not error.largest_scale:  # no scale mends it: held axes, a specimen that is not borne at rest
                 raise
@@ -71,9 +73,25 @@ def check_campaign(
             exceeded += [quantity for quantity in error.exceeded if quantity not in exceeded]
             fits = min(fits, error.largest_scale / _own_scale(numbers, test))
     if clauses:
-        fits = rounded_down((1.0 + 1e-9) * fits, 3)  # a quotient of three digits each is exact but for rounding
-        every = f"The largest scale of the campaign with which all of these tests fit is {fits:g}"
-        raise OutOfRangeError(". ".join([*clauses, every]), fits, tuple(exceeded))
+        fits = _three_digits(fits)
+        clauses.append(f"The largest scale of the campaign with which all of these tests fit is {fits:g}")
+        for remedy in flow_remedies(machine) if FLOW in exceeded else ():
+            more = _campaign_scale(numbers, _chosen(numbers, tests), remedy.machine)
+            if more > fits:  # else other limits govern
+                clauses.append(f"{remedy.words} the largest scale of the campaign is {more:g}")
+        raise OutOfRangeError(". ".join(clauses), fits, tuple(exceeded))
+
+
+def _campaign_scale(numbers: Parameters, tests: Sequence[str], machine: Machine) -> float:
+    """Largest scale of the campaign, three digits, with which all of its tests fit."""
+    plant = make_plant(machine)
+    targets = {test: _as_run(numbers, test, _target(numbers, test, machine, 1.0)) for test in tests}
+    return _three_digits(min(fitting_scale(plant, one) / _own_scale(numbers, test) for test, one in targets.items()))
+
+
+def _three_digits(scale: float) -> float:
+    """Rounded down; a quotient of three digits each is exact but for rounding."""
+    return rounded_down((1.0 + 1e-9) * scale, 3)
 
 
 def simulate_campaign(

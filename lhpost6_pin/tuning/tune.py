@@ -87,8 +87,23 @@ class AxisTuning:
         if np.isfinite(high) and not (high_now > (1.0 - _BAND_LOST) * high and low_now < (1.0 + _BAND_LOST) * low):
             now = f"{low_now:.2g} to {high_now:.3g} Hz" if np.isfinite(high_now) else "no band"
             found.append(f"band {low:.2g} to {high:.3g} Hz before, {now} after")
-        if np.isfinite(high_now) and not high_now < (1.0 + _BAND_LOST) * high:  # or none before
-            return tuple(found)
+        return tuple(found) if self._is_wider else (*found, *self._smaller_margins)
+
+    @property
+    def traded(self) -> tuple[str, ...]:
+        """Margins that pay for a wider band, a phrase each as in `worse`; none where there was no band before."""
+        return self._smaller_margins if self._is_wider and np.isfinite(self.band_before[1]) else ()
+
+    @property
+    def _is_wider(self) -> bool:
+        """Whether the band ends beyond what it did before, or there was none."""
+        before, now = self.band_before[1], self.band_after[1]
+        return bool(np.isfinite(now) and not now < (1.0 + _BAND_LOST) * before)
+
+    @property
+    def _smaller_margins(self) -> tuple[str, ...]:
+        """Margins that are smaller after the tuning than before."""
+        found = []
         before, after = self.margin_before, self.margin_after
         with np.errstate(invalid="ignore"):  # infinite margins both before and after are no loss
             gains, phases = 20.0 * np.log10([before.gain, after.gain]), np.degrees([before.phase, after.phase])

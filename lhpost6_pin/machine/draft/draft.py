@@ -19,7 +19,7 @@ from ..quantity import Quantity, Value
 from ..structure import MOTIONS
 from .asked import refuse_alternatives
 from .cylinder import CYLINDERS, cylinder_areas, cylinder_numbers
-from .legs import Leg, guided_legs, largest_travel, leg_rows, platform_legs
+from .legs import Leg, guided_legs, largest_travel, leg_rows, plan_distance, platform_legs
 from .typical import Basis, first, vector
 
 __all__ = ["draft_machine"]
@@ -164,7 +164,10 @@ def _legs(basis: Basis, motion: str, size: tuple[float, ...], depth: float) -> l
     under = first(basis.known_or("platen_radius", "platform.platen_radius", min(size), "the smaller side").value)
     base = first(basis.known_or("base_radius", "platform.base_radius", under, "the radius under the platen").value)
     above, below = (first(basis.known_or(name, f"platform.{name}").value) for name in _PLACES[2:4])
-    return platform_legs((under, base), (above, below), depth, length)
+    radii, spreads = (under, base), (above, below)
+    if "length" not in basis.known:  # typical of the stroke, but the legs must reach
+        length = max(length, basis.rule("platform.leg_length") * plan_distance(radii, spreads))
+    return platform_legs(radii, spreads, depth, length)
 
 
 def _ends(basis: Basis, legs: Sequence[Leg]) -> dict[str, dict[str, Quantity]]:

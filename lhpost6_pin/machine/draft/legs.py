@@ -1,5 +1,6 @@
 """Where the actuators of a drafted machine act, and what they can give along each axis in the zero-position."""
 
+import cmath
 import math
 from collections.abc import Sequence
 from itertools import product
@@ -10,7 +11,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 
-__all__ = ["Leg", "guided_legs", "largest_travel", "leg_rows", "platform_legs"]
+__all__ = ["Leg", "guided_legs", "largest_travel", "leg_rows", "plan_distance", "platform_legs"]
 
 
 class Leg(NamedTuple):
@@ -44,6 +45,13 @@ def platform_legs(radii: tuple[float, float], spreads: tuple[float, float], dept
     radii [m] of the joints and spreads [rad], the angle between the two of a pair: under the platen, and on the base.
     Raises ParameterError if legs of that length [m] do not reach.
     """
+    level = plan_distance(radii, spreads)
+    if level >= length:
+        least = math.ceil(1.0 + 1000.0 * level) / 1000.0
+        raise ParameterError(
+            f"--length {length:.4g} m: legs from joints {level:.4g} m apart in plan do not reach the platen; "
+            f"give at least {least:.4g} m (legs at 45 deg: {math.sqrt(2.0) * level:.4g} m), or closer radii"
+        )
     platen_radius, base_radius = radii
     legs: list[Leg] = []
     for pair in range(3):
@@ -52,15 +60,14 @@ def platform_legs(radii: tuple[float, float], spreads: tuple[float, float], dept
             under = 2.0 * math.pi / 3.0 * pair + side * (math.pi / 3.0 - 0.5 * spreads[0])
             point = np.array([platen_radius * math.cos(under), platen_radius * math.sin(under), -depth])
             foot = np.array([base_radius * math.cos(base), base_radius * math.sin(base), 0.0])
-            level = float(np.hypot(*(point - foot)[:2]))
-            if level >= length:
-                raise ParameterError(
-                    f"--length {length:.4g} m: legs from joints {level:.4g} m apart in plan do not reach the platen; "
-                    "make them longer, or the radii closer to each other"
-                )
             foot[2] = -depth - math.sqrt(length**2 - level**2)
             legs.append(Leg(f"L{len(legs) + 1}", point, foot))
     return legs
+
+
+def plan_distance(radii: tuple[float, float], spreads: tuple[float, float]) -> float:
+    """Distance in plan [m] of the two joints of a leg of `platform_legs`, the same of all six."""
+    return abs(radii[0] * cmath.exp(1j * (math.pi / 3.0 - 0.5 * spreads[0])) - radii[1] * cmath.exp(0.5j * spreads[1]))
 
 
 def leg_rows(legs: Sequence[Leg]) -> Array:

@@ -10,7 +10,8 @@ from .page import Block, Headline, Level, Page, Section, Table, bullet_list, gri
 from .scales import decibels, degrees, milliseconds
 from .tune_plots import bode_figure, overview_figure
 
-__all__ = ["losses", "measuring_doubts", "specimen_limits", "tuning_tables", "write_tune_report"]
+__all__ = ["headlines", "losses", "measuring_doubts", "specimen_limits", "trades", "tuning_tables"]
+__all__ += ["write_tune_report"]
 
 # Judgement, not physics: the band in which every axis must follow its reference, and the margin it must keep.
 FOLLOWED = (0.1, 20.0)  # [Hz]
@@ -33,7 +34,7 @@ def write_tune_report(tuning: Tuning, path: Path | str, command: str = "") -> Pa
         ),
         verdict=verdict,
         level=level,
-        headlines=_headlines(tuning),
+        headlines=headlines(tuning),
         sections=[
             Section("bands", "Bands and margins", [*tuning_tables(tuning), overview_figure(tuning)]),
             Section("limits", "Bandwidth limitation, 20 to 33 Hz", _limits(tuning)),
@@ -70,6 +71,7 @@ def _verdict(tuning: Tuning) -> tuple[str, Level]:
         f"The loop is {'stable' if tuning.doubled else 'unstable'} with all master gains doubled.",
         *specimen_limits(tuning),
         *losses(tuning),
+        *trades(tuning),
         *measuring_doubts(tuning),
     ]
     if any(np.isnan(axis.band_after[0]) for axis in tuning.axes):
@@ -81,6 +83,12 @@ def _verdict(tuning: Tuning) -> tuple[str, Level]:
 def losses(tuning: Tuning) -> list[str]:
     """Sentences on axes that are worse with the settings found than with those before."""
     return [f"Worse than before in {axis.axis}: {'; '.join(axis.worse)}." for axis in tuning.axes if axis.worse]
+
+
+def trades(tuning: Tuning) -> list[str]:
+    """Sentences on axes whose margin is smaller than before in return for a wider band: no loss, but stated."""
+    start = "For a band at least a tenth wider the margin is smaller than before in"
+    return [f"{start} {axis.axis}: {'; '.join(axis.traded)}." for axis in tuning.axes if axis.traded]
 
 
 def specimen_limits(tuning: Tuning) -> list[str]:
@@ -100,7 +108,8 @@ def measuring_doubts(tuning: Tuning) -> list[str]:
     return [f"{start} {axis.axis}: {axis.doubt}." for axis in tuning.axes if axis.doubt]
 
 
-def _headlines(tuning: Tuning) -> list[Headline]:
+def headlines(tuning: Tuning) -> list[Headline]:
+    """Return the cards: narrowest band, smallest gain margin, target delay."""
     lost = [axis for axis in tuning.axes if np.isnan(axis.band_after[1])]
     narrow = lost[0] if lost else min(tuning.axes, key=lambda axis: axis.band_after[1])
     close = min(tuning.axes, key=lambda axis: axis.margin_after.gain)
@@ -116,7 +125,7 @@ def _headlines(tuning: Tuning) -> list[Headline]:
         Headline(
             decibels(close.margin_after.gain),
             "Smallest gain margin",
-            f"axis {close.axis}, {_at(close.margin_after.gain_frequency)}; before: {_margin_before(tuning, close)}",
+            f"axis {close.axis}, {_at(close.margin_after.gain_frequency)}; {_smallest_before(tuning)}",
             "good" if 20.0 * np.log10(close.margin_after.gain) >= GAIN_MARGIN else "attention",
         ),
         Headline(
@@ -176,8 +185,12 @@ def _band_before(tuning: Tuning, axis: AxisTuning) -> str:
     return _band(axis.band_before) if tuning.was_stable else UNSTABLE
 
 
-def _margin_before(tuning: Tuning, axis: AxisTuning) -> str:
-    return decibels(axis.margin_before.gain) if tuning.was_stable else UNSTABLE
+def _smallest_before(tuning: Tuning) -> str:
+    """The smallest gain margin before, which may be that of another axis."""
+    if not tuning.was_stable:
+        return f"before: {UNSTABLE}"
+    close = min(tuning.axes, key=lambda axis: axis.margin_before.gain)
+    return f"smallest before: {decibels(close.margin_before.gain)}, axis {close.axis}"
 
 
 def _limits(tuning: Tuning) -> list[Block]:

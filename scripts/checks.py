@@ -1,10 +1,9 @@
-"""All checks of the project: lint, format, types, tests, a battery of sealed cases. Exit code 0 only if all pass.
+"""All checks of the project: lint, format, types, tests. Exit code 0 only if all pass.
 
     python scripts/checks.py [--fast | --slow]
 
---fast leaves out the battery and all tests marked `long`: under two minutes, between two edits. --slow runs the long
-studies that the ordinary run leaves out, builds the documentation site, and searches a battery of one-axis tables. A
-battery has a few brief cases, made anew.
+--fast leaves out all tests marked `long`: between two edits. --slow runs the long studies that the ordinary run leaves
+out, builds the documentation site, and searches two batteries of a few brief cases, made anew.
 """
 
 import os
@@ -17,11 +16,11 @@ from typing import Any
 
 ROOT = Path(__file__).parent.parent
 TESTS = ["-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]
-BATTERY = ["scripts/blind_battery.py", "--cases", "2", "--brief", "--seed", "903", "--check"]
-"""One that lacks nothing, one with one effect."""
-
-ONE_AXIS = ["scripts/one_axis_battery.py", "--cases", "4", "--brief", "--seed", "7", "--check"]
-"""Two that lack nothing, one with each effect; with the slow tests."""
+BATTERIES = {
+    "battery": ["scripts/blind_battery.py", "--cases", "3", "--brief", "--seed", "901", "--check"],
+    "one-axis battery": ["scripts/one_axis_battery.py", "--cases", "4", "--brief", "--seed", "7", "--check"],
+}
+"""One that lacks nothing, one with one effect, and one with two; two that lack nothing, one with each effect."""
 
 COMPILE = """
 import sys
@@ -51,9 +50,8 @@ def main() -> int:
         failed = [name for name, command in checks.items() if not _passes(name, command)]
         list(beside.map(_compile, COMPILED, [f"{folder}/{k}" for k in range(len(COMPILED))]))  # until both have ended
         failed += ["tests"] * (not _passes("tests", [*TESTS, *chosen]))
-        if not fast:
-            name, battery = ("one-axis battery", ONE_AXIS) if slow else ("battery", BATTERY)
-            command = [*battery, "--jobs", str(os.cpu_count() or 1), "--out", f"{folder}/battery"]
+        for name, battery in BATTERIES.items() if slow else ():
+            command = [*battery, "--jobs", str(os.cpu_count() or 1), "--out", f"{folder}/{name}"]
             failed += [name] * (not _passes(name, command))
         print(f"== types: -m mypy\n{types.result().stdout}", end="", flush=True)
         failed += ["types"] * (types.result().returncode != 0)

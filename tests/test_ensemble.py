@@ -370,6 +370,7 @@ def test_a_killed_ensemble_goes_on_to_the_same_file(sines, tmp_path):
 
 
 @pytest.mark.long
+@pytest.mark.slow
 def test_processes_give_the_same_file(sines, tmp_path):
     made, path = sines
     assert digest(run_ensemble(made, tmp_path, jobs=2)) == digest(path)

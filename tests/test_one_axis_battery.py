@@ -115,6 +115,7 @@ def test_energy_that_the_valve_brings_is_stored_or_lost():
 
 
 @pytest.mark.parametrize(("table", "mean", "order"), [(SMOOTH, 0.4, 3.7), (PLAIN, 0.0, 0.9)])
+@pytest.mark.slow
 def test_halving_the_step_converges(table, mean, order):
     """Order four where all is smooth; friction and a valve turn at instants that no step hits, which costs orders."""
     ends = []

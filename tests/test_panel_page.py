@@ -298,6 +298,7 @@ def test_an_open_panel_listens_to_others_on_its_page_alone_and_needs_its_token(t
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on this computer")
+@pytest.mark.slow
 def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
     async def press(tab: Tab, name: str):
         await wait(tab, f"!document.getElementById('{name}').disabled", name)

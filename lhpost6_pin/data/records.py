@@ -205,7 +205,7 @@ def sample_interval(dataset: xr.Dataset) -> float:
 
 def is_measured(dataset: xr.Dataset) -> bool:
     """Whether sensors stand between a record and its motion: real ones, or the noise of simulated ones."""
-    return dataset.attrs.get("kind") != "simulated" or "noise" in dataset.attrs
+    return str(dataset.attrs.get("kind")) != "simulated" or "noise" in dataset.attrs
 
 
 def require(dataset: xr.Dataset, *names: str) -> None:

@@ -13,6 +13,7 @@ that do not agree with it then, or bear nothing, by inertia.
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import cache
 from itertools import combinations, permutations
 from typing import NamedTuple
 
@@ -202,6 +203,7 @@ class _Search:
             yield _Wrong(those, units[0] if len(units) == 1 else math.nan, balance.by, abs(ratio))
 
 
+@cache
 def _unit_factors() -> dict[float, list[str]]:
     """Logarithms of factors that correct forces, each with the pairs of units that were exchanged."""
     factors = {unit: known.factor for unit in units_of("N") if (known := parse_unit(unit))}
@@ -217,14 +219,8 @@ def _exchanged(factor: float) -> str:
     """Units that were exchanged, as a factor corrects them; "sign" of a turned one; empty if none were."""
     if factor == TURNED:
         return "sign"
-    return (
-        next(
-            (" or ".join(pairs) for value, pairs in _unit_factors().items() if abs(math.log(factor) - value) < ALIKE),
-            "",
-        )
-        if factor > 0.0
-        else ""
-    )
+    alike = (pairs for value, pairs in _unit_factors().items() if abs(math.log(factor) - value) < ALIKE)
+    return " or ".join(next(alike, [])) if factor > 0.0 else ""
 
 
 def _finding(units: str, each: Sequence[_Wrong]) -> RecordFinding:

@@ -80,8 +80,8 @@ def follow(
     """Path of a test; raises RecordError naming the sample where a leg is out of its stroke.
 
     Raises SimulationError for a specimen that moves on joints or in modes. What does not differ from the `known` path
-    of the same motion with another plant is reused. start (n_states,) are the friction states at the start, if not
-    zero.
+    of the same motion with another plant is reused; where the states at the start are given, its ports alone. start
+    (n_states,) are the friction states at the start, if not zero.
     """
     if plant.flexible:
         raise SimulationError("residuals take a rigid specimen at most; what a moving one exerts beyond is `carried`")
@@ -95,8 +95,8 @@ def follow(
         ports, along, required, old = known[1]
         if not require_alike(known[0], plant):
             required = _required(plant, test, plant_motion(plant, test.motion), ports.turn)
-        before = [one[:2] for one in known[0].moving]
-        if len(plant.states) == old.shape[1] and before == [one[:2] for one in plant.moving]:
+        before = [one[:2] for one in known[0].moving] if start is None else []
+        if start is None and len(plant.states) == old.shape[1] and before == [one[:2] for one in plant.moving]:
             return Path(ports, along, required, old)
         there = {key: old[:, place] for key, place in before}
         same = len(before) if before == [one[:2] for one in plant.moving[: len(before)]] else 0

@@ -22,13 +22,12 @@ from ...data.measured_sensors import find_sensors
 from ...data.records import is_measured, require, sample_interval
 from ...data.sensors import SensorSet
 from ...data.signals import Band
-from ...effects.registry import law_of, states_of
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
 from ...mechanics.interface_wrench import bare
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import PlatenMotion
-from ..friction_start import estimate_start
+from ..friction_start import estimate_start, largest_share
 from ..inverse_dynamics import Decomposition, inverse_dynamics
 from ..known_slip import UNKNOWN_SLIP, slip_summary
 from ..prepare import (
@@ -187,7 +186,9 @@ def decompose_test(
         notes.append(f"Simulated without noise: the platen's motion is the record's own{step}")
     if start is None:
         start = estimate_start(plant, test, decompose_numbers().number("comparison.cutoff"))
-        notes += _held(plant, start) if start.any() else []
+        if share := largest_share(plant, start):
+            held = f"{100.0 * share:.0f} % of their friction"
+            notes.append(f"Seals or pads hold up to {held} at the start, by the balance of forces.")
     time = record["time"].values
     floors = test.channels.get("floor_acceleration") if plant.machine.floors else None
     modelled = mounted if mounted is not plant and floors is None and mounted.coupled is None else None
@@ -196,13 +197,6 @@ def decompose_test(
         floor_acceleration=floors, mounted=modelled, path=test.path, start=start, model_step=at_steps,
     )  # fmt: skip
     return found, tuple(notes)
-
-
-def _held(plant: Plant, start: Array) -> list[str]:
-    """A note on the friction that is held at the start of a test."""
-    shares = [np.linalg.norm(start[states_of(row)]) for row in plant.rows if law_of(row).friction_memory]
-    largest = 100.0 * max(shares, default=0.0)
-    return [f"Seals or pads hold up to {largest:.0f} % of their friction at the start, by the balance of forces."]
 
 
 def _filtered(

@@ -159,6 +159,18 @@ def test_a_record_that_begins_during_the_motion_is_found(tests):
     assert ("warning", "platen_velocity[y]", 0) in found
 
 
+@pytest.mark.parametrize(("roll", "said"), [(2e-6, False), (2e-3, True)])
+def test_rounding_of_an_axis_that_hardly_moves_is_no_start_in_motion(roll: float, said: bool):
+    """2 micro-radians move an edge of the platen by 0.01 mm, in a test of 0.5 m."""
+    t = np.arange(4096) / 1024
+    moved = np.clip(t - 1, 0, 1) ** 3 * np.sin(2 * np.pi * 2 * (t - 1))
+    motion = np.zeros((4096, 6))
+    motion[:, 0] = 0.5 * moved
+    motion[:, 3] = roll * (1 + 0.3 * moved)
+    record = make_record(t, {"platen_displacement": motion}, {}, {"kind": "measured"})
+    assert (("warning", "platen_displacement[roll]", 0) in faults(check_dataset(record))) == said
+
+
 def test_unfiltered_noise_up_to_half_the_sampling_rate_is_found(tests):
     record, channel = tests["EQ"], "platen_acceleration[z]"
     x = series(record, channel)

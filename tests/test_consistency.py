@@ -209,6 +209,14 @@ def test_a_gain_or_cross_talk_beyond_its_range_is_named(plant, redundant, channe
         np.testing.assert_allclose(again, first, atol=0.012 * np.abs(first).max())
 
 
+def test_a_turned_axis_of_the_displacement_is_the_only_fault(plant, redundant):
+    """Velocity, acceleration, lengths and forces contradict it, and none of them is accused."""
+    turned = with_change(redundant, "platen_displacement", scaled(1, -1.0))
+    faults = find_sensor_faults(plant, turned, SENSORS)
+    assert [(f.name, f.family) for f in faults] == [("sign platen_displacement[y]", "accelerometer_error")]
+    assert find_sensor_faults(plant, correct_records(turned, faults), SENSORS) == ()
+
+
 def test_a_late_group_of_channels_is_named(plant, redundant):
     dt = float(redundant[0]["time"][1] - redundant[0]["time"][0])
     late = with_change(redundant, "platen_acceleration", lambda x: align(x, -3e-3, dt))

@@ -386,19 +386,21 @@ def test_an_effect_that_a_held_out_test_hardly_shows_stays_only_where_that_test_
 
 
 @pytest.mark.parametrize(
-    ("gain", "share", "why"),
+    ("gain", "expected", "share", "why"),
     [
-        (243.0, 0.69, None),  # air in the oil beside an overlap of all valves, which makes a hundred times its residual
-        (243.0, 0.4, "held_out"),
-        (300.0, 0.4, None),  # most of the gain that is expected
-        (100.0, 0.69, "held_out"),  # less than three tenths of it
+        (243.0, 394.0, 0.69, None),  # air in the oil beside an overlap of all valves, of a hundred times its residual
+        (243.0, 394.0, 0.4, "held_out"),
+        (300.0, 394.0, 0.4, None),  # most of the gain that is expected
+        (100.0, 394.0, 0.69, "held_out"),  # less than three tenths of it
+        (13.5, 12.1, np.nan, None),  # thrust along the platen's normal where it hardly tilts: nothing is beyond noise
+        (5.0, 12.1, np.nan, "held_out"),
     ],
 )
-def test_a_weak_effect_beside_a_strong_one_is_judged_by_what_is_beyond_noise(gain, share, why):
-    """The strong one's squares, before any effect, are no measure of the weak one."""
+def test_a_weak_effect_is_judged_by_what_is_beyond_noise(gain, expected, share, why):
+    """Squares before any effect, of noise or of a strong one beside it, are no measure of it."""
     held = SimpleNamespace(tests=[SimpleNamespace(channels=LAYOUT)], kinds=("wrench", "flow"), rows=lambda _: [True])
     left = SimpleNamespace(whitened=[np.ones((9, 1))])
-    given = {"residual_at": left, "without_effect": SimpleNamespace(solution=None), "gain_on": (gain, 394.0)}
+    given = {"residual_at": left, "without_effect": SimpleNamespace(solution=None), "gain_on": (gain, expected)}
     given |= {"lowers_squares": False, "is_absorbed": False, "absorbing": (), "share_explained": share}
     problem = SimpleNamespace(machine=load_machine(), unknowns=())
     found = SimpleNamespace(problem=problem, numbers=discovery_numbers()[0], refit=None, solution=None, added=(ADDED,))

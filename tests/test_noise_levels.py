@@ -106,6 +106,30 @@ def test_a_command_that_moves_ends_a_rest(tests):
     assert rests[0] == () and all(len(slices) == 2 for slices in rests[1:])
 
 
+# Comparisons ----------------------------------------------------------------------------------------------------------
+
+
+def test_sensors_are_compared_by_the_noise_that_their_records_show(tests, tmp_path):
+    """A file that states thirty times as much: by that nothing could be wrong, not even an accelerometer off by 6 %."""
+    content = measured_sensors(PLANT, tests)
+    stated = {key: q for key, q in content.items() if key.startswith("noise.")}
+    much = {key: replace(q, value=tuple(30.0 * np.atleast_1d(q.value))) for key, q in stated.items()}
+    save_sensors(replace(content, quantities={**content.quantities, **much}), path := tmp_path / "much.toml")
+    off = with_change(tests, "platen_acceleration", lambda x: 1.06 * x)
+    for records, wrong in ((tests, set()), (off, {"gain"})):
+        found = check_campaign(TABLE, records, str(path))
+        assert found is not None and found.findings is not None
+        assert {f.quantity for f in found.findings if f.verdict == "suspicious"} == wrong
+        assert any("an effect may pass for noise" in words for words in found.warnings)
+
+
+def test_records_free_of_noise_are_not_compared():
+    """What rounding leaves is no noise: any error of numerical derivatives would be beyond it."""
+    found = check_campaign(TABLE, [shaken(k) for k in range(4)], "lhpost6")
+    assert found is not None and found.findings is None and found.noise == ()
+    assert "simulated without noise" in found.warnings[0] and "record two seconds" not in found.warnings[0]
+
+
 # Levels ---------------------------------------------------------------------------------------------------------------
 
 

@@ -11,7 +11,7 @@ from ..machine.parameters import Parameters
 from ..mechanics.plant import make_plant
 from .channels import LAYOUT
 from .consistency import ConsistencyFinding, check_sensors
-from .measured_sensors import NoiseComparison, compare_noise, measured_sensors
+from .measured_sensors import NoiseComparison, compare_noise, measured_sensors, with_measured_noise
 from .noise_levels import noise_levels
 from .observable import Observable, observable
 from .records import is_measured
@@ -35,7 +35,7 @@ class CampaignCheck:
     source: str  # of the noise levels
     stated: str  # name of the sensors that they are compared with; empty: none
     noise: tuple[NoiseComparison, ...]
-    findings: tuple[ConsistencyFinding, ...] | None  # of redundant sensors; None where their noise is not known
+    findings: tuple[ConsistencyFinding, ...] | None  # of redundant sensors; None where they show no noise to judge by
     observable: tuple[Observable, ...]
     content: Parameters | None  # of a sensors file
     reason: str  # why there is none
@@ -84,8 +84,12 @@ def check_campaign(machine: Machine, records: Sequence[xr.Dataset], sensors: str
     try:
         content = measured_sensors(plant, measured, levels)
     except RecordError as error:
-        reason = f"{error}; record two seconds of rest before and after each test"
-    used = known or (make_sensors(content) if content else None)
+        reason = str(error)
+        if levels.hidden:
+            reason += "; record two seconds of rest before and after each test"
+    used = make_sensors(content) if content else None
+    if known and (levels.channels or levels.hidden):  # else the records are free of noise
+        used = with_measured_noise(known, measured)
     present = [name for name in LAYOUT if all(name in r for r in measured)]
     return CampaignCheck(
         rate=levels.rate,

@@ -35,6 +35,7 @@ __all__ = ["check_dataset", "check_record"]
 
 _Warning = tuple[str, int | None, str, str]  # channel, sample, message, remedy
 
+BESIDE = 1e-2  # of a channel's largest span, m and rad alike: what moves less in one unit is judged beside that
 START = 2e-3  # of the largest span in the same unit: how far the first sample may be from rest
 START_NOISE = 8.0  # and how many standard deviations of the noise
 STILL = 2e-5  # of that span: a channel that moved by more each sample does not stop at once by itself
@@ -147,7 +148,7 @@ def _given(dataset: xr.Dataset, name: str) -> bool:
 
 # -------------------------------------------------------------------------------------------- values
 class _Column(NamedTuple):
-    """One column of a channel, with the largest span of the columns in the same unit."""
+    """One column of a channel, with the largest span of the columns in the same unit, or `BESIDE` that of all."""
 
     channel: str
     x: Array  # (n,)
@@ -168,7 +169,7 @@ def _columns(dataset: xr.Dataset, names: Iterable[str], judged: Mask) -> Iterato
         spans = np.ptp(values, axis=0)
         for k, x in enumerate(values.T):
             alike = spans[3 * (k // 3) :][:3] if "axis" in variable.dims else spans
-            yield _Column(channel_name(variable, k), x, float(max(alike.max(), 1e-6 * spans.max())), measured, judged)
+            yield _Column(channel_name(variable, k), x, float(max(alike.max(), BESIDE * spans.max())), measured, judged)
 
 
 def _held(c: _Column, machine: Machine | None) -> bool:

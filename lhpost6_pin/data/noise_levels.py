@@ -27,6 +27,7 @@ __all__ = ["CORNER", "ChannelNoise", "NoiseLevels", "noise_levels"]
 LEAST_OWN = 0.05  # of the resolution's variance: noise below it cannot be told from none, and is taken as this
 CORNER = 0.25  # of the power of the plateau: gain one half
 ROUND_OFF = 1e-20  # of the noisiest column's density: what varies by 1e-10 of that is computed, and no sensor's
+SINGLE = float(np.finfo(np.float32).eps)  # of a channel's largest range: no sensor resolves as little
 FIT = (0.05, 1e-3)  # relative power down to which the low-pass is fitted; least, for its logarithm
 
 
@@ -264,7 +265,8 @@ def _channel(
     f, mean, count = spectrum
     used = (f >= band[0]) & (f <= band[1])
     density = _level(mean[used], count)
-    density = np.where(density > ROUND_OFF * density.max(), density, 0.0)
+    least = max(ROUND_OFF * density.max(), (SINGLE * pool.range) ** 2 / f[-1])
+    density = np.where(density > least, density, 0.0)
     quantum = np.mean(pool.quantum, axis=0)
     own = np.where(density > 0, np.maximum(density - quantum, LEAST_OWN * quantum), 0.0)
     # a mean of chi-squares, whose median has 1.25 times its deviation; half of that is of the root

@@ -83,7 +83,7 @@ def share_explained(
     """Share of the log-likelihood beyond noise that is explained, in the column where it is most.
 
     Of residuals of a problem's tests, whitened bins (m, c), before and after a joint fit, in the columns that a family
-    shows in; zero where hardly anything is beyond noise.
+    shows in; nan where hardly anything is beyond noise.
     """
     doubt, rows = numbers.number("accept.doubt"), rows_shown(problem, family)
 
@@ -94,7 +94,7 @@ def share_explained(
 
     old, new = beyond(before), beyond(after)
     most = np.unravel_index(np.argmax(old - new), old.shape)
-    return float((old - new)[most] / old[most]) if old[most] > numbers.number("accept.gain") else 0.0
+    return float((old - new)[most] / old[most]) if old[most] > numbers.number("accept.gain") else np.nan
 
 
 def rows_shown(problem: Problem, family: Family) -> Mask:

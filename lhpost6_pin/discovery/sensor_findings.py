@@ -14,7 +14,9 @@ from ..core.names import AXES
 from ..data.alignment import align_record
 from ..data.channels import LAYOUT
 from ..data.consistency import ConsistencyFinding, check_sensors
+from ..data.layout_faults import RecordFinding
 from ..data.sensors import SensorSet
+from ..data.turned_displacement import turned_displacement
 from ..data.turned_signs import turned_signs
 from ..mechanics.plant import Plant
 
@@ -60,8 +62,12 @@ def find_sensor_faults(
 ) -> tuple[SensorFault, ...]:
     """Faults of redundant sensors, pooled over records, and turned signs; raises what `check_sensors` does.
 
-    Play of actuators that are `loose` shifts the means of their lengths, which are not reported.
+    Axes of the displacement that are turned are turned back before anything else is judged. Play of actuators that are
+    `loose` shifts the means of their lengths, which are not reported.
     """
+    upright = [turned_displacement(record, plant.machine)[0] for record in records]
+    turned = _in_most(upright)
+    records = correct_records(records, turned)
     findings = check_sensors(plant, records, sensors)
     late = _late(findings, sensors)
     if late:  # a large delay biases the gain
@@ -70,14 +76,15 @@ def find_sensor_faults(
     shifted = {f"actuator_displacement[{name}]" for name in loose}
     wrong = [f for f in findings if f.check in _CHECKS and f.verdict == "suspicious"]
     faults = [_fault(f, sensors) for f in wrong if f.quantity != "offset" or f.channel not in shifted]
-    return (*(f for f in faults if f is not None), *late, *_turned(plant, records))
+    opposed = _in_most([turned_signs(record, plant.machine) for record in records])
+    return (*turned, *(f for f in faults if f is not None), *late, *opposed)
 
 
-def _turned(plant: Plant, records: Sequence[xr.Dataset]) -> list[SensorFault]:
-    """Forces and pressure differences that oppose the motion they cause in most of the records."""
-    count = Counter(f.channel for record in records for f in turned_signs(record, plant.machine))
-    turned = [channel.rstrip("]").partition("[") for channel, n in count.items() if 2 * n > len(records)]
-    return [SensorFault("sign", name, label, -1.0, "1", 0.0, 0.0) for name, _, label in turned]
+def _in_most(turned: Sequence[Sequence[RecordFinding]]) -> list[SensorFault]:
+    """Channels that are turned in most of the records, from the findings on each."""
+    count = Counter(f.channel for each in turned for f in each)
+    names = [channel.rstrip("]").partition("[") for channel, n in count.items() if 2 * n > len(turned)]
+    return [SensorFault("sign", name, label, -1.0, "1", 0.0, 0.0) for name, _, label in names]
 
 
 def _fault(finding: ConsistencyFinding, sensors: SensorSet) -> SensorFault | None:

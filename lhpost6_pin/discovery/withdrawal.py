@@ -120,8 +120,8 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     what is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the squares in some
     column by a share of those before any effect. Not so where parameters run to their bounds without it, where it
     explains half of what is beyond noise there, or where it gains most of what is expected, and is one of two of a
-    family or explains a good part of that. One that the held-out tests do not excite, with an expected gain within
-    chance, stays, but not on a table with one actuator, which every test excites.
+    family, explains a good part of that, or nothing is beyond noise without it. One that the held-out tests do not
+    excite, with an expected gain within chance, stays, but not on a table with one actuator, which every test excites.
     """
     if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
         return None  # a sensor's error
@@ -139,8 +139,9 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     if lowers_squares(first, old, new, n("accept.of_first")) or is_absorbed(one.candidate, absorbing(less)):
         return None
     share = share_explained(held, *both, family, found.numbers)
+    closes = share >= n("accept.most") or np.isnan(share)  # nan: nothing is left to close
     as_expected = gain >= n("accept.expected") * expected
-    if share >= n("accept.half") or (as_expected and (_is_one_of_two(found, one) or share >= n("accept.most"))):
+    if share >= n("accept.half") or (as_expected and (closes or _is_one_of_two(found, one))):
         return None
     return Withdrawn(one.candidate.name, family.named, "held_out", gain=gain)
 

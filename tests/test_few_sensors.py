@@ -379,6 +379,7 @@ def test_an_effect_that_a_held_out_test_hardly_shows_stays_only_where_that_test_
     held = SimpleNamespace(tests=[SimpleNamespace(channels=LAYOUT)], kinds=("wrench", "flow"), rows=lambda _: [True])
     left = SimpleNamespace(whitened=[np.ones((9, 1))])
     given = {"residual_at": left, "without_effect": SimpleNamespace(solution=None), "gain_on": (2.0, 6.0)}
+    given["share_explained"] = np.nan
     for machine, wanted in ((table, "held_out"), (load_machine(), None)):
         problem = SimpleNamespace(machine=machine, unknowns=())
         found = SimpleNamespace(problem=problem, numbers=discovery_numbers()[0], refit=None, solution=None)
@@ -393,7 +394,8 @@ def test_an_effect_that_a_held_out_test_hardly_shows_stays_only_where_that_test_
         (300.0, 394.0, 0.4, None),  # most of the gain that is expected
         (100.0, 394.0, 0.69, "held_out"),  # less than three tenths of it
         (13.5, 12.1, np.nan, None),  # thrust along the platen's normal where it hardly tilts: nothing is beyond noise
-        (5.0, 12.1, np.nan, "held_out"),
+        (3.5, 13.5, np.nan, None),  # a leak, by two deviations of noise less than expected, by three more than by none
+        (-1.0, 13.5, np.nan, "held_out"),
     ],
 )
 def test_a_weak_effect_is_judged_by_what_is_beyond_noise(gain, expected, share, why):

@@ -144,3 +144,14 @@ def test_warnings_of_a_campaign_begin_with_the_name_of_their_test(caplog):
         simulate_campaign(uniaxial, load_controller("uniaxial"), sensors, seed=0, tests=("TX",))
     assert caplog.messages and all(message.startswith("TX: ") for message in caplog.messages)
     assert any("spool values beyond full stroke were clipped" in message for message in caplog.messages)
+
+
+def test_a_spool_held_over_each_sample_is_recorded_at_the_instants_of_the_samples():
+    """Cubics exactly; a sine of 60 Hz but for the fourth power of its angle in a sample, over thirty."""
+    edges = np.arange(257) / 2048.0
+    cubic = np.diff(edges**4) * 2048.0 / 4.0
+    np.testing.assert_allclose(module._at_instants(cubic[:, None])[2:-1, 0], edges[2:-2] ** 3, rtol=1e-9)
+    omega = 2.0 * np.pi * 60.0
+    means = np.diff(-np.cos(omega * edges)) * 2048.0 / omega
+    found = module._at_instants(means[:, None])[2:-1, 0]
+    np.testing.assert_allclose(found, np.sin(omega * edges[2:-2]), atol=1.1 * (omega / 2048.0) ** 4 / 30.0)

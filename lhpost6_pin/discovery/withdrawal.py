@@ -120,8 +120,10 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     what is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the squares in some
     column by a share of those before any effect. Not so where parameters run to their bounds without it, where it
     explains half of what is beyond noise there, or where it gains most of what is expected, and is one of two of a
-    family, explains a good part of that, or nothing is beyond noise without it. One that the held-out tests do not
-    excite, with an expected gain within chance, stays, but not on a table with one actuator, which every test excites.
+    family or explains a good part of that. Where nothing is beyond noise without it, no form of another effect can
+    pass for it, and any gain speaks for it: with it the gain has mean `expected`, without it -expected. One that the
+    held-out tests do not excite, with an expected gain within chance, stays. On a table with one actuator these two do
+    not hold: every test excites it, and few sensors leave much to be confused.
     """
     if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
         return None  # a sensor's error
@@ -131,19 +133,21 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     family, both = one.candidate.family, (before.whitened, after.whitened)
     rows = rows_shown(held, family)
     gain, expected = gain_on(held, before, after, rows)
+    withdrawn = Withdrawn(one.candidate.name, family.named, "held_out", gain=gain)
     if not single and expected <= n("accept.chance"):
         return None
+    share = share_explained(held, *both, family, found.numbers)
+    if not single and np.isnan(share):
+        return withdrawn if gain < 0.0 else None
     if gain < max(np.sqrt(2.0 * expected), n("accept.held_out") * expected):
-        return Withdrawn(one.candidate.name, family.named, "held_out", gain=gain)
+        return withdrawn
     first, old, new = (squares_by_column(at.whitened)[rows] for at in (original, before, after))
     if lowers_squares(first, old, new, n("accept.of_first")) or is_absorbed(one.candidate, absorbing(less)):
         return None
-    share = share_explained(held, *both, family, found.numbers)
-    closes = share >= n("accept.most") or np.isnan(share)  # nan: nothing is left to close
     as_expected = gain >= n("accept.expected") * expected
-    if share >= n("accept.half") or (as_expected and (closes or _is_one_of_two(found, one))):
+    if share >= n("accept.half") or (as_expected and (_is_one_of_two(found, one) or share >= n("accept.most"))):
         return None
-    return Withdrawn(one.candidate.name, family.named, "held_out", gain=gain)
+    return withdrawn
 
 
 def _is_one_of_two(found: Search, one: AddedEffect) -> bool:

@@ -219,6 +219,16 @@ def draw_errors(record: xr.Dataset, sensors: SensorSet, rng: np.random.Generator
     return SensorErrors(gain, offset, delay)
 
 
+def _at_instants(means: Array) -> Array:
+    """Values (n, k) at the start of every sample from the means over samples (n, k), exact for cubics.
+
+    The mean of two neighbours, used at either end, loses 0.14 % of a motion of 30 Hz: as much as a lag of 0.3 ms does.
+    """
+    values = 0.5 * (means + np.vstack([means[:1], means[:-1]]))
+    values[2:-1] = (7.0 * (means[1:-2] + means[2:-1]) - means[:-3] - means[3:]) / 12.0
+    return values
+
+
 def as_sensed(
     record: xr.Dataset, sensors: SensorSet, errors: SensorErrors, rate: float, rng: np.random.Generator
 ) -> xr.Dataset:
@@ -236,7 +246,7 @@ def as_sensed(
             continue
         values = record[name].values.astype(float)
         if name in LAYOUT and LAYOUT[name].held:
-            values = 0.5 * (values + np.vstack([values[:1], values[:-1]]))
+            values = _at_instants(values)
         delay = errors.delay.get(group_of.get(name, ""), 0.0)
         if delay:
             values = align(values, -delay, dt)

@@ -1,5 +1,6 @@
 """The report of a validation: agreement of model and measurement in three phases, by test and axis."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from ...identification.known_slip import UNKNOWN_SLIP
@@ -96,28 +97,36 @@ def _headline(found: Validation, n: int) -> Headline:
 
 def validation_notes(found: Validation) -> list[str]:
     """Return missing phases and events; tests with the same note share it."""
-    tests: dict[str, dict[str, None]] = {}
+    said: list[tuple[str, str]] = []
     for phase in found.phases:
         missing = [f"no {PHASES[phase.number]}: {phase.reason}"] if phase.reason else []
-        for words in (*missing, *phase.notes * (phase.number > 1), *([phase.slip] if phase.slip else [])):
-            tests.setdefault(words, {})[phase.test] = None
-    notes = [
+        words = (*missing, *phase.notes * (phase.number > 1), *([phase.slip] if phase.slip else []))
+        said += [(phase.test, one) for one in words]
+    notes = _by_note(found, said)
+    return [*notes, UNKNOWN_SLIP] if any(phase.slip for phase in found.phases) else notes
+
+
+def _by_note(found: Validation, said: Iterable[tuple[str, str]]) -> list[str]:
+    """Notes, given with their tests, once each with all its tests."""
+    tests: dict[str, dict[str, None]] = {}
+    for test, words in said:
+        tests.setdefault(words, {})[test] = None
+    return [
         f"{'All tests' if len(names) == len(found.tests) > 1 else ', '.join(names)}: {words}"
         for words, names in tests.items()
     ]
-    return [*notes, UNKNOWN_SLIP] if any(phase.slip for phase in found.phases) else notes
 
 
 def _assumptions(found: Validation) -> list[Block]:
     sensors, band = found.sensors, found.numbers.band
     guessed = sum(q.assumed for q in sensors.parameters.values())
-    made = [p.notes for p in found.phases if p.number == 1 and not p.reason]
+    made = [(p.test, words) for p in found.phases if p.number == 1 and not p.reason for words in p.notes]
     lines = [
-        *dict.fromkeys(words for notes in made for words in notes),
+        *_by_note(found, made),
         f"All compared signals are low-passed by one zero-phase filter (gain 1/2 at {band.high:g} Hz, order "
         f"{band.order}); {found.numbers.edge:g} s at each end are omitted. Spectra are not filtered.",
-        "Open-loop runs start in the control zero-position with the first recorded pressures and with friction at "
-        "rest.",
+        "Open-loop runs start in the control zero-position with the first recorded pressures and with what seals and "
+        "pads hold then by the balance of forces (nothing in a simulated test, or with a specimen that moves).",
         f"Noise is the change caused by adding the noise of “{sensors.name}” to a record once more; {guessed} of its "
         f"{len(sensors.parameters)} numbers are assumed. Gains and offsets of sensors are not corrected.",
         *(

@@ -12,7 +12,8 @@ let known = 0, camera = null, field = 0;
 
 const SMOOTH = 1000 / 33; // [ms] that a frame may take: thirty a second, and some to spare
 const JUDGED = 15, COARSEST = 0.4; // frames judged together; least share of the screen's pixels, along each side
-let share = 1, drawn = 1, frames = 0, since = 0;
+const STILL = 300; // [ms] without a command from a server: its table is at rest
+let share = 1, drawn = 1, frames = 0, since = 0, told = -Infinity;
 
 function fit() { // a narrower window sees as much in width
   if (viewer.camera !== camera) { camera = viewer.camera; field = Math.tan((camera.fov * Math.PI) / 360); }
@@ -40,7 +41,7 @@ function resolve(wanted) {
   viewer.set_dirty();
 }
 function keep_pace(now) { // a computer too slow for every pixel draws fewer while the table moves, all of them at rest
-  if (!animator.playing || document.hidden) { frames = 0; resolve(1); return; }
+  if (!(animator.playing || now - told < STILL) || document.hidden) { frames = 0; resolve(1); return; }
   resolve(share);
   if (frames === 0) since = now;
   if (frames++ < JUDGED) return;
@@ -99,7 +100,11 @@ if (live) { // what is sent: meshcat's commands, words on how it goes, and deman
   const socket = new WebSocket(new URL("commands", location.href).href.replace(/^http/, "ws"));
   socket.binaryType = "arraybuffer";
   socket.onmessage = ({ data }) => {
-    if (typeof data !== "string") { viewer.handle_command_bytearray(new Uint8Array(data)); return; }
+    if (typeof data !== "string") {
+      told = performance.now();
+      viewer.handle_command_bytearray(new Uint8Array(data));
+      return;
+    }
     const { status, meters } = JSON.parse(data);
     part("status").textContent = status;
     part("live").hidden = false;

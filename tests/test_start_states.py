@@ -101,9 +101,22 @@ def test_what_seals_and_pads_hold_at_the_start_is_no_residual(problem, base, sha
     assert power(problem.starts[0].less(noise)) > 0.99 * power(noise)
 
 
-def test_the_balance_of_forces_shows_what_is_held_at_the_start(base):
-    """Forces of a test that began with states of its own, from the motion and forces of one that did not."""
-    plant, test, start = base.plant, base.tests[0], drawn(base.plant, 0.8)
+def full(plant):
+    """All of the friction held at the start, in directions of chance."""
+    start = drawn(plant, 1.0)
+    for row in plant.rows:
+        if law_of(row).friction_memory:
+            start[states_of(row)] /= np.linalg.norm(start[states_of(row)])
+    return start
+
+
+@pytest.mark.parametrize("held", [lambda plant: drawn(plant, 0.8), full], ids=["part", "full"])
+def test_the_balance_of_forces_shows_what_is_held_at_the_start(base, held):
+    """Forces of a test that began with states of its own, from the motion and forces of one that did not.
+
+    From full friction on the force is no linear function of the state: what remains is within a twentieth of the noise.
+    """
+    plant, test, start = base.plant, base.tests[0], held(base.plant)
     rest = evaluate_residuals(plant, test, ("wrench",)).wrench
     more = evaluate_residuals(plant, test, ("wrench",), path=follow(plant, test, start=start)).wrench - rest
     arms = leg_wrenches(plant, plant_motion(plant, test.motion).q, np.ones((test.samples, plant.spools)))
@@ -112,9 +125,8 @@ def test_the_balance_of_forces_shows_what_is_held_at_the_start(base):
     found = estimate_start(plant, began, 30.0)
     after = evaluate_residuals(plant, began, ("wrench",), path=follow(plant, began, start=found)).wrench
     before = evaluate_residuals(plant, began, ("wrench",)).wrench
-    for axis in plant.axes:  # a mean may as well be an offset of the load cells
-        spread = [x[:, axis].std() for x in (before, after, rest)]
-        assert spread[1] < 0.1 * spread[0] + spread[2]
+    spreads = [x[:, plant.axes].std(axis=0) for x in (before, after, rest)]  # means may be offsets of the load cells
+    assert np.all(spreads[1] < 1.05 * spreads[2]) and np.any(spreads[0] > 1.5 * spreads[2])
 
 
 def test_a_test_that_began_at_rest_is_left_as_it_is(base):

@@ -1,11 +1,12 @@
 """Floor of the gaps on held-out tests: what is expected of a model that lacks nothing.
 
 Every held-out test is simulated by a machine as plausible as the one with the effects, driven by the recorded spools
-and recorded through the sensors; its gap to the machine with the effects is the floor. The plausible machine has all
-that the search counts as noise: numbers drawn from their posterior distribution, those of the form of friction among
-them, and warmer oil. The noise simulated has the power that the search found in most columns of the residuals: noise
-stated too small is in all of them, an effect that is missing in few. Where a test cannot be simulated from its spools,
-as in the closed loop, the floor is that noise and the difference between the models of both machines.
+from what friction held at the start by estimate, and recorded through the sensors; its gap to the machine with the
+effects is the floor. The plausible machine has all that the search counts as noise: numbers drawn from their posterior
+distribution, those of the form of friction among them, and warmer oil. The noise simulated has the power that the
+search found in most columns of the residuals: noise stated too small is in all of them, an effect that is missing in
+few. Where a test cannot be simulated from its spools, as in the closed loop, the floor is that noise and the difference
+between the models of both machines.
 """
 
 from collections.abc import Sequence
@@ -75,7 +76,8 @@ def expected_gaps(
         if not own:
             continue
         try:
-            simulated = _simulated(machine, clean, noisier, rng)
+            began = [start for n in own if (start := compared[test, n].start) is not None]
+            simulated = _simulated(machine, clean, noisier, rng, began[-1] if began else None)
             seen = corrected_record(simulated, problem.unknowns, (x - drawn)[len(problem.parameters) :])
             again = validate(after.machine, Campaign(test, (seen,)), sensors=sensors, phases=own, jobs=jobs)
         except (RecordError, SimulationError):  # spools were not measured, or the run stops early
@@ -125,10 +127,15 @@ def _drawn(found: Search) -> Array:
     return np.asarray(drawn)
 
 
-def _simulated(machine: Machine, record: xr.Dataset, sensors: SensorSet, rng: np.random.Generator) -> xr.Dataset:
-    """A test as a machine would have it with the same spools, with the channels that were measured."""
+def _simulated(
+    machine: Machine, record: xr.Dataset, sensors: SensorSet, rng: np.random.Generator, start: Array | None
+) -> xr.Dataset:
+    """A test as a machine would have it with the same spools, with the channels that were measured.
+
+    start (n_states,) is what friction holds at its start; None: nothing.
+    """
     own = {"test": record.attrs.get("test", "test")}
-    run = replay(machine, record, attrs=own, engine=fastest_engine(make_plant(machine))).record
+    run = replay(machine, record, attrs=own, friction=start, engine=fastest_engine(make_plant(machine))).record
     rate = (record.sizes["time"] - 1) / float(record["time"][-1] - record["time"][0])
     every = max(1, round(SAMPLE_RATE / rate))
     sensed = as_sensed(run, sensors, SensorErrors({}, {}, {}), SAMPLE_RATE / every, rng)

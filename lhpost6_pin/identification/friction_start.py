@@ -4,6 +4,8 @@ Nothing measures them. They change the balance of forces until the platen has tr
 proportion: two states along one slip differ by an amount that decays with the travel.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,13 +20,17 @@ from .prepare import MeasuredTest, actuator_forces
 from .residual_kernels import row_wrenches
 from .residuals import Path, evaluate_residuals, follow
 
-__all__ = ["estimate_start", "largest_share", "start_deviation", "start_wrenches"]
+__all__ = ["estimate_start", "largest_share", "start_deviation", "start_wrenches", "with_start"]
 
 APART = 0.5
-"""State, of full friction, above and below zero between which its change of the wrench is taken."""
+"""State, of full friction, above and below a state between which its change of the wrench is taken."""
 
-ROUNDS = 3
-"""Estimates: size and correlation of the error that weighs one are of what the one before leaves."""
+ROUNDS = 4
+"""Linearisations: on a triangle whose seals and pads held all of their friction, what the third one left of its wrench
+was that of the true states within a tenth."""
+
+WEIGHINGS = 2
+"""Estimates in each: size and correlation of the error that weighs one are of what the one before leaves."""
 
 
 def start_deviation() -> float:
@@ -32,29 +38,33 @@ def start_deviation() -> float:
     return load_parameters(models_folder() / "procedures" / "decompose.toml").number("friction.held")
 
 
-def start_wrenches(plant: Plant, test: MeasuredTest, path: Path | None = None) -> tuple[Array, NDArray[np.intp]]:
+def start_wrenches(
+    plant: Plant, test: MeasuredTest, path: Path | None = None, about: Array | None = None
+) -> tuple[Array, NDArray[np.intp]]:
     """Wrenches (n, 6, k) on the platen at C in {c} [N, N m] by a unit of each of k states at the start; their places.
 
-    path is that of `follow`, if it is known. There are none (k = 0) where forces are not measured, as there is no
-    balance of them.
+    Of states near those of `about` (n_states,), by default the test's own, and up to full friction. path is that of `follow`, if
+    it is known. There are none (k = 0) where forces are not measured, as there is no balance of them.
     """
     force, rows = actuator_forces(plant.machine, test.channels), _friction_rows(plant)
     if force is None or not len(rows):
         return np.zeros((test.samples, 6, 0)), np.zeros(0, np.intp)
     known = plant, path or follow(plant, test)
+    middle = test.states_at_start(plant.states) if about is None else about
     sizes = [states_of(row).stop - states_of(row).start for row in rows]
     found, places = [], []
     for nth in range(max(sizes)):
         some = rows[[size > nth for size in sizes]]
         own = [states_of(row).start + nth for row in some]
-        sides = []
-        for start in (APART, -APART):
-            state = np.zeros(len(plant.states))
-            state[own] = start
+        sides, states = [], []
+        for step in (APART, -APART):
+            state = middle.copy()
+            state[own] = np.clip(state[own] + step, -1.0, 1.0)
             began = follow(plant, test, known, start=state)
             z = with_loads(plant, began.ports, began.required, began.z, force)
             sides.append(row_wrenches(plant, began.ports, z, some))
-        found.append((sides[0] - sides[1]) / (2.0 * APART))
+            states.append(state[own])
+        found.append((sides[0] - sides[1]) / (states[0] - states[1])[:, None])
         places += own
     return np.concatenate(found, axis=1).swapaxes(1, 2), np.array(places)
 
@@ -62,38 +72,58 @@ def start_wrenches(plant: Plant, test: MeasuredTest, path: Path | None = None) -
 def estimate_start(plant: Plant, test: MeasuredTest, cutoff: float) -> Array:
     """Friction's states (n_states,) at the start of a measured test, by the balance of forces up to `cutoff` [Hz].
 
-    The most probable ones, with the prior of `start_deviation` and an error of the balance that is, on each axis, as
-    large as what remains of it, and as correlated from sample to sample (an autoregression of first order, after
-    Cochrane and Orcutt, 1949). Zero in a simulated test, and where forces are not measured. Means over the test count
-    for nothing: a force that stays may be the offset of a sensor.
+    The most probable ones, at most full friction, with the prior of `start_deviation` and an error of the balance that
+    is, on each axis, as large as what remains of it, and as correlated from sample to sample (an autoregression of
+    first order, after Cochrane and Orcutt, 1949): the balance is linearised anew about each estimate. Zero in a
+    simulated test, and where forces are not measured. Means over the test count for nothing: a force that stays may be
+    the offset of a sensor.
     """
     out = np.zeros(len(plant.states))
     if not is_measured(test.record):
         return out
-    path = follow(plant, test)
-    wrenches, places = start_wrenches(plant, test, path)
-    if not len(places):
-        return out
-    residual = evaluate_residuals(plant, test, ("wrench",), path=path).wrench
+    known = plant, follow(plant, test)
     block = max(round(0.5 / (cutoff * test.dt)), 1)
-    count = test.samples // block
-    rest, slopes = (_varying(x[: count * block].reshape(count, block, *x.shape[1:]).mean(axis=1))[:, plant.axes]
-                    for x in (residual, wrenches))  # fmt: skip
-    found, prior = np.zeros(len(places)), np.eye(len(places)) / start_deviation() ** 2
-    for _ in range(ROUNDS):
+    for nth in range(ROUNDS):
+        slopes, places = start_wrenches(plant, test, known[1], out)
+        if not len(places):
+            return out
+        path = follow(plant, test, known, start=out)
+        wrench = evaluate_residuals(plant, test, ("wrench",), path=path).wrench
+        rest, slopes = (_varying(_averaged(x, block))[:, plant.axes] for x in (wrench, slopes))
+        rest = rest + slopes @ out[places]  # without any state
+        if not np.sum(rest**2, axis=0).all():  # a balance without any error: nothing is to be explained
+            return out
+        out[places] = _fitted(rest, slopes, out[places], white=nth == 0)
+        for row in _friction_rows(plant):
+            own = out[states_of(row)]
+            own /= max(float(np.linalg.norm(own)), 1.0)
+    return out
+
+
+def with_start(plant: Plant, test: MeasuredTest, cutoff: float) -> MeasuredTest:
+    """The test with friction's states at its start by `estimate_start`."""
+    pairs = zip(plant.states, estimate_start(plant, test, cutoff), strict=True)
+    return replace(test, start={name: float(state) for name, state in pairs if state})
+
+
+def _fitted(rest: Array, slopes: Array, found: Array, white: bool) -> Array:
+    """Most probable states (k,) by what the balance (n, a) leaves without them, and its slopes (n, a, k).
+
+    The error is first that which the states `found` leave, and where it is `white`, without correlation: that of a
+    balance which the states are to explain would be theirs.
+    """
+    from scipy.optimize import lsq_linear
+
+    count, prior = len(found), 1.0 / start_deviation()
+    for nth in range(WEIGHINGS):
         left = rest - slopes @ found
         size = np.sum(left**2, axis=0)
-        if not size.all():  # a balance without any error: nothing is to be explained
-            return out
-        share = np.sum(left[1:] * left[:-1], axis=0) / size
+        share = np.zeros(len(size)) if white and nth == 0 else np.sum(left[1:] * left[:-1], axis=0) / size
         error = np.sqrt(np.mean(_new(left, share) ** 2, axis=0))
-        rows = (_new(slopes, share[:, None]) / error[:, None]).reshape(-1, len(places))
-        found = np.linalg.solve(rows.T @ rows + prior, rows.T @ (_new(rest, share) / error).ravel())
-    out[places] = found
-    for row in _friction_rows(plant):
-        own = out[states_of(row)]
-        own /= max(float(np.linalg.norm(own)), 1.0)  # no more than full friction
-    return out
+        rows = (_new(slopes, share[:, None]) / error[:, None]).reshape(-1, count)
+        rows, wanted = np.vstack([rows, prior * np.eye(count)]), (_new(rest, share) / error).ravel()
+        found = lsq_linear(rows, np.append(wanted, np.zeros(count)), (-1.0, 1.0), method="bvls").x
+    return found
 
 
 def largest_share(plant: Plant, start: Array) -> float:
@@ -103,6 +133,12 @@ def largest_share(plant: Plant, start: Array) -> float:
 
 def _friction_rows(plant: Plant) -> NDArray[np.void]:
     return np.array([row for row in plant.rows if law_of(row).friction_memory], plant.rows.dtype)
+
+
+def _averaged(x: Array, block: int) -> Array:
+    """Means of samples (n, ...) over blocks."""
+    count = len(x) // block
+    return np.asarray(x[: count * block].reshape(count, block, *x.shape[1:]).mean(axis=1))
 
 
 def _varying(x: Array) -> Array:

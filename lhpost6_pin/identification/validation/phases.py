@@ -61,6 +61,7 @@ class Phase:
     resonances: tuple[Resonance, ...] = ()
     lags: tuple[Lag, ...] = ()  # of a closed loop behind its reference
     notes: tuple[str, ...] = ()
+    start: Array | None = None  # (n_states,) what friction held at the start, as estimated; None: it began with nothing
     slip: str = ""  # in which share of inverse dynamics friction's slip is unknown, and the error in the rest
     reason: str | None = None
 
@@ -103,16 +104,17 @@ def _inverse_dynamics(test: PreparedTest) -> Phase:
     ours, theirs = (numbers.band.apply(x, test.test.dt)[inside] for x in (found.measured, found.residual))
     slip = slip_summary(found.states.plant, test.test, ours, theirs, inside)
     agreement = agree(pairs, test.test.dt, numbers)
-    return Phase(1, test.test.name, test.time, tuple(pairs), agreement, spectrum, notes=notes, slip=slip)
+    start = found.states.z[0]
+    return Phase(1, test.test.name, test.time, tuple(pairs), agreement, spectrum, notes=notes, start=start, slip=slip)
 
 
 def _open_loop(test: PreparedTest) -> Phase:
     engine = fastest_engine(test.plant)
-    held = None if test.plant.flexible else estimate_start(test.plant, test.test, test.basis.numbers.band.high)
+    start = None if test.plant.flexible else estimate_start(test.plant, test.test, test.basis.numbers.band.high)
     machine = test.plant.machine
-    ran, again = (replay(machine, m.record, attrs={}, friction=held, engine=engine) for m in (test.test, test.again))
+    ran, again = (replay(machine, m.record, attrs={}, friction=start, engine=engine) for m in (test.test, test.again))
     channels = ("actuator_force", "chamber_pressure_a", "chamber_pressure_b")
-    return _of_run(2, SimulatedComparison(test, ran, again), channels)
+    return replace(_of_run(2, SimulatedComparison(test, ran, again), channels), start=start)
 
 
 def _closed_loop(test: PreparedTest) -> Phase:

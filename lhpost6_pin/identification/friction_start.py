@@ -43,8 +43,8 @@ def start_wrenches(
 ) -> tuple[Array, NDArray[np.intp]]:
     """Wrenches (n, 6, k) on the platen at C in {c} [N, N m] by a unit of each of k states at the start; their places.
 
-    Of states near those of `about` (n_states,), by default the test's own, and up to full friction. path is that of `follow`, if
-    it is known. There are none (k = 0) where forces are not measured, as there is no balance of them.
+    Of states near those of `about` (n_states,), by default the test's own, and up to full friction. path is that of
+    `follow`, if it is known. There are none (k = 0) where forces are not measured, as there is no balance of them.
     """
     force, rows = actuator_forces(plant.machine, test.channels), _friction_rows(plant)
     if force is None or not len(rows):

@@ -81,7 +81,7 @@ def estimate_start(plant: Plant, test: MeasuredTest, cutoff: float) -> Array:
     out = np.zeros(len(plant.states))
     if not is_measured(test.record):
         return out
-    known = plant, follow(plant, test)
+    known, deviation = (plant, follow(plant, test)), start_deviation()
     block = max(round(0.5 / (cutoff * test.dt)), 1)
     for nth in range(ROUNDS):
         slopes, places = start_wrenches(plant, test, known[1], out)
@@ -93,7 +93,7 @@ def estimate_start(plant: Plant, test: MeasuredTest, cutoff: float) -> Array:
         rest = rest + slopes @ out[places]  # without any state
         if not np.sum(rest**2, axis=0).all():  # a balance without any error: nothing is to be explained
             return out
-        out[places] = _fitted(rest, slopes, out[places], white=nth == 0)
+        out[places] = _fitted(rest, slopes, out[places], deviation, white=nth == 0)
         for row in _friction_rows(plant):
             own = out[states_of(row)]
             own /= max(float(np.linalg.norm(own)), 1.0)
@@ -106,22 +106,22 @@ def with_start(plant: Plant, test: MeasuredTest, cutoff: float) -> MeasuredTest:
     return replace(test, start={name: float(state) for name, state in pairs if state})
 
 
-def _fitted(rest: Array, slopes: Array, found: Array, white: bool) -> Array:
+def _fitted(rest: Array, slopes: Array, found: Array, deviation: float, white: bool) -> Array:
     """Most probable states (k,) by what the balance (n, a) leaves without them, and its slopes (n, a, k).
 
-    The error is first that which the states `found` leave, and where it is `white`, without correlation: that of a
-    balance which the states are to explain would be theirs.
+    Each has this prior deviation. The error is first that which the states `found` leave; `white`, without correlation,
+    as long as the states that are to explain the balance would be its own.
     """
     from scipy.optimize import lsq_linear
 
-    count, prior = len(found), 1.0 / start_deviation()
+    count = len(found)
     for nth in range(WEIGHINGS):
         left = rest - slopes @ found
         size = np.sum(left**2, axis=0)
         share = np.zeros(len(size)) if white and nth == 0 else np.sum(left[1:] * left[:-1], axis=0) / size
         error = np.sqrt(np.mean(_new(left, share) ** 2, axis=0))
         rows = (_new(slopes, share[:, None]) / error[:, None]).reshape(-1, count)
-        rows, wanted = np.vstack([rows, prior * np.eye(count)]), (_new(rest, share) / error).ravel()
+        rows, wanted = np.vstack([rows, np.eye(count) / deviation]), (_new(rest, share) / error).ravel()
         found = lsq_linear(rows, np.append(wanted, np.zeros(count)), (-1.0, 1.0), method="bvls").x
     return found
 

@@ -216,6 +216,9 @@ def test_run_leaves_a_valid_record_and_a_report_and_says_how_well_it_followed(lh
         assert phrase in ended.words
     page = (tmp_path / "here" / "report.html").read_text()
     assert "lhpost6 run sine --set amplitude=0.02" in page  # how to repeat it
+    assert (
+        "it was run at 1. What the achieved motion demands" in page and " governs, at" not in page
+    )  # card and table do
 
 
 def test_run_names_a_folder_after_the_motion_and_replaces_its_own_results_with_a_warning(lhpost6, tmp_path, caplog):

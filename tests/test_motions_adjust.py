@@ -122,6 +122,11 @@ def test_a_time_scale_that_cannot_be_is_refused(factor):
 
 
 # --------------------------------------------------------------------------------------------- matched
+def test_a_missing_spectrum_is_called_one(tmp_path):
+    with pytest.raises(MotionError, match=r"cannot read response spectrum .*none\.csv"):
+        load_spectrum(tmp_path / "none.csv")
+
+
 @pytest.mark.parametrize(
     ("name", "options", "damping"),
     [

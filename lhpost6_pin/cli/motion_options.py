@@ -94,7 +94,12 @@ class MotionOptions:
     rotate_by: RotateBy = None
     match_spectrum: MatchSpectrum = None
     spectrum_damping: SpectrumDamping = None
-    set_: Annotated[list[str] | None, typer.Option("--set", help="Option of a generated motion, key=value.")] = None
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", help="Option of a generated motion, key=value, in SI or followed by its unit (50mm, 1g)."
+        ),
+    ] = None
     dt: FileStep = None
     unit: FileUnit = None
     channels: FileChannels = None

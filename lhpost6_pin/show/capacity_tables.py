@@ -74,7 +74,7 @@ def judged(plant: Plant, record: xr.Dataset) -> tuple[tuple[Peak, ...], str]:
         return found.peaks, ""
     return found.peaks, (
         f"The largest scale of this target within all limits, less their reserves, is {found.fits:g}; it was run at "
-        f"{float(record.attrs['scale']):g}. What the achieved motion demands of each limit is in “Demand over capacity”."
+        f"{float(record.attrs['scale']):g}. What the achieved motion demands of each is in “Demand over capacity”."
     )
 
 

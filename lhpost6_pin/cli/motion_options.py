@@ -34,7 +34,7 @@ TimeScale = Annotated[
     float | None,
     typer.Option(
         help="Factor of durations; accelerations stay, displacements follow with its square (similitude). "
-        "A run needs about 3 GB of memory for 15 minutes of motion."
+        "A run needs about 6 GB of memory for 15 minutes of motion."
     ),
 ]
 Taper = Annotated[

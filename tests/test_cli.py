@@ -28,14 +28,17 @@ from lhpost6_pin.cli import rehearse as rehearse_commands
 from lhpost6_pin.cli.app import JOBS, command_name
 from lhpost6_pin.control.inverse import InverseFilter, save_inverse
 from lhpost6_pin.core.compiled import cache_folder
+from lhpost6_pin.core.errors import OutOfRangeError
 from lhpost6_pin.core.files import shipped, shipped_specimens
 from lhpost6_pin.core.names import AXES, ENGINES, SCHEMES
 from lhpost6_pin.data.check import check_record
 from lhpost6_pin.data.records import load_record, save_record
 from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, list_motions, make_target
 from lhpost6_pin.simulation import rehearse
-from lhpost6_pin.tuning.drives import circumstances, save_drive
+from lhpost6_pin.simulation.motion_limits import check_motion_limits
+from lhpost6_pin.tuning.drives import circumstances, load_drive, save_drive, scaled_drive
 
 pytestmark = pytest.mark.long
 
@@ -213,6 +216,9 @@ def test_run_leaves_a_valid_record_and_a_report_and_says_how_well_it_followed(lh
         assert phrase in ended.words
     page = (tmp_path / "here" / "report.html").read_text()
     assert "lhpost6 run sine --set amplitude=0.02" in page  # how to repeat it
+    assert (
+        "it was run at 1. What the achieved motion demands" in page and " governs, at" not in page
+    )  # card and table do
 
 
 def test_run_names_a_folder_after_the_motion_and_replaces_its_own_results_with_a_warning(lhpost6, tmp_path, caplog):
@@ -432,6 +438,24 @@ def test_a_drive_whose_target_is_beyond_the_limits_of_the_table_is_not_replayed(
     target = make_target(find_motion("sine", cycles=1, ramp_cycles=1), scale=50.0)
     save_drive(target.acceleration, "acceleration", target, tmp_path / "drive.nc", circumstances(load_machine(), "any"))
     assert refused(lhpost6("replay", "drive.nc"), "exceeds the capacity of the table", "largest scale that fits")
+
+
+def test_the_scale_that_a_refused_replay_names_is_the_one_to_type(lhpost6, tmp_path):
+    made = make_target(find_motion("sine", cycles=1, ramp_cycles=1), scale=0.5, axes="x")
+    save_drive(made.acceleration, "acceleration", made, tmp_path / "drive.nc", circumstances(load_machine(), "any"))
+    drive, plant = load_drive(tmp_path / "drive.nc"), make_plant(load_machine())
+    ended = lhpost6("replay", "drive.nc", "--scale", "50", "--json")
+    error = json.loads(ended.out)["error"]
+    fits, message = error["largest_scale"], error["message"]
+    assert f"The largest scale that fits is {fits:g}; " in message and "iterated at scale 0.5," in message
+    check_motion_limits(plant, scaled_drive(drive, fits).target)
+    with pytest.raises(OutOfRangeError):  # it has three digits, rounded down
+        check_motion_limits(plant, scaled_drive(drive, 1.01 * fits).target)
+    remedy = float(re.search(r"the largest scale is ([\d.]+\d)", message)[1])
+    opened = make_plant(load_machine().with_valves(2))
+    check_motion_limits(opened, scaled_drive(drive, remedy).target)
+    with pytest.raises(OutOfRangeError):
+        check_motion_limits(opened, scaled_drive(drive, 1.01 * remedy).target)
 
 
 def test_a_command_that_is_refused_before_anything_is_done_leaves_no_bar(lhpost6, tmp_path):

@@ -378,7 +378,7 @@ def test_the_iteration_shows_the_demand_of_its_target_in_the_units_of_a_run(iter
     wanted = np.abs(iterated.target.displacement[:, 0]).max()
     # of the one actuator along x its stroke is the displacement
     assert peaks["Displacement"] == peaks["Actuator stroke"] == f"{1e3 * wanted:#.3g} mm"
-    assert all(re.fullmatch(r"[\d.]+ (mm|m/s|g|MN)", peak) for peak in peaks.values()), peaks
+    assert all(re.fullmatch(r"[\d.]+ (mm|m/s|g|kN)", peak) for peak in peaks.values()), peaks
     assert {"Actuator velocity", "Actuator push", "Actuator pull", "Axis force"} <= set(peaks)
     words = Reader(write_iterate_report(iterated, tmp_path / "i.html")).words
     assert "The quantity of the drive is acceleration" in words

@@ -382,4 +382,5 @@ def test_a_motion_at_the_scale_that_fits_leaves_no_stroke_and_none_of_its_limits
     assert test.run.trouble is None and len(test.run.time) == len(target.time)
     achieved = test.record["platen_displacement"].values
     assert not stroke_ends(plant, test.run.time, achieved)
-    assert judge_record(plant, test.record, fits=False).governing.utilisation <= 1.0
+    peaks = judge_record(plant, test.record, fits=False).peaks
+    assert max(peak.utilisation for peak in peaks if peak.decides) <= 1.0

@@ -97,6 +97,16 @@ def test_displacements_follow_with_the_square_of_the_time_scale_sample_by_sample
         assert np.abs(ours - theirs)[strong].max() < 0.02 * np.abs(theirs).max(), quantity
 
 
+@pytest.mark.parametrize("factor", [1.0, 50.0])
+def test_coming_from_and_going_to_rest_adds_no_acceleration_however_long_the_motion_is_made(factor):
+    """Displacements at the ends are times the square of the factor, and are led to zero beyond the record's ends."""
+    motion = with_time_scale(find_motion("ridgecrest"), factor)
+    target = make_target(motion, rate=128.0)
+    clock, size = target.time + target.reference.start, np.abs(target.acceleration)
+    beyond = (clock < 0.0) | (clock > motion.duration)
+    assert size[beyond].max() < 0.01 * size[~beyond].max()  # 0.06 % at factor 1; 350 % within four seconds at factor 50
+
+
 def test_angles_stay_and_angular_accelerations_grow_in_compressed_time():
     motion = find_motion("sfu-like")
     scaled = with_time_scale(motion, 0.5)
@@ -112,6 +122,11 @@ def test_a_time_scale_that_cannot_be_is_refused(factor):
 
 
 # --------------------------------------------------------------------------------------------- matched
+def test_a_missing_spectrum_is_called_one(tmp_path):
+    with pytest.raises(MotionError, match=r"cannot read response spectrum .*none\.csv"):
+        load_spectrum(tmp_path / "none.csv")
+
+
 @pytest.mark.parametrize(
     ("name", "options", "damping"),
     [

@@ -1,6 +1,7 @@
 """Motions by name: shipped records, tests with the peaks they promise, AC156 within its tolerance."""
 
 import hashlib
+import re
 import subprocess
 import sys
 import zipfile
@@ -95,6 +96,39 @@ def test_switches_and_lists_are_understood_as_the_command_line_gives_them():
     assert find_motion("white-noise", six_axis="true").axes == ("x", "y", "z", "roll", "pitch", "yaw")
     one, same = (find_motion("ac156", high_pass=value).samples for value in ("0.5, 0.6, 0.9", [0.5, 0.6, 0.9]))
     np.testing.assert_array_equal(one, same)
+
+
+@pytest.mark.parametrize(
+    ("name", "option", "written", "value"),
+    [
+        ("ac156", "sds", "1 g", GRAVITY),
+        ("ac156", "sds", "1g", GRAVITY),
+        ("ac156", "high_pass", "0.5, 0.6, 0.9 Hz", [0.5, 0.6, 0.9]),
+        ("sine", "amplitude", "50mm", 0.05),
+        ("sine", "amplitude", "0.05 m", 0.05),
+        ("sine", "period", "500 ms", 0.5),
+        ("sfu-like", "peak_rotation", "1 deg, 0.5 deg, 0.01 rad", [np.pi / 180, np.pi / 360, 0.01]),
+    ],
+)
+def test_an_option_takes_its_quantity_in_any_unit(name, option, written, value):
+    found, same = find_motion(name, **{option: written}), find_motion(name, **{option: value})
+    np.testing.assert_allclose(found.samples, same.samples, rtol=1e-12, atol=1e-15)  # rounding of the conversion
+
+
+@pytest.mark.parametrize(
+    ("name", "option", "written", "unit"),
+    [
+        ("ac156", "sds", "1 mm", "m/s^2"),
+        ("ac156", "sds", "g", "m/s^2"),
+        ("ac156", "sds", "-1 g", "m/s^2"),
+        ("sine", "amplitude", "50 s", "m"),
+        ("sfu-like", "peak_rotation_velocity", "1 Hz", "rad/s"),  # a rotation has an angle
+        ("sfu-like", "peak_rotation", "1 deg, 0.5, 0.5", "rad"),  # of the others it is not known
+    ],
+)
+def test_a_quantity_of_another_kind_is_refused_with_the_unit_to_give(name, option, written, unit):
+    with pytest.raises(MotionError, match=f"^{name}: option {option} is {written!r}; give .*, in {re.escape(unit)} or"):
+        find_motion(name, **{option: written})
 
 
 def test_each_option_has_a_default_in_si_with_unit_and_source():

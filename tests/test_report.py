@@ -23,10 +23,12 @@ from lhpost6_pin.mechanics.specimen_modes import SpecimenMode
 from lhpost6_pin.show.report.interaction_section import interaction_blocks
 from lhpost6_pin.show.report.page import Page, Section, Table, bar, number, packed_plotly, render_page, save_page, text
 from lhpost6_pin.show.report.plots import ACHIEVED, Row, Trace, envelope, time_figure
+from lhpost6_pin.show.report.run_limits import limit_table
 from lhpost6_pin.show.report.run_report import RunSummary, lead_summary, write_run_report
 from lhpost6_pin.show.report.scales import SCALES, Scale, percent, scaled_number, shown_as
 from lhpost6_pin.show.report.specimen_section import response_blocks
 from lhpost6_pin.show.terminal import _rich
+from lhpost6_pin.simulation.limit_use import LimitUse
 from lhpost6_pin.tuning.interaction import Cut, Interaction
 
 AXES = ["x", "y", "z", "roll", "pitch", "yaw"]
@@ -706,3 +708,13 @@ def test_a_report_of_a_record_alone_says_that_limits_were_not_evaluated(tmp_path
     assert summary.headlines[2].label == "Largest spool demand; limits were not evaluated"
     page = (tmp_path / "report.html").read_text()
     assert "Limits of the machine were not evaluated" in page and "Unloading is the loss" not in page
+
+
+@pytest.mark.parametrize(
+    ("factor", "shown"), [(1e3, ["1.43 MN", "0.429 MN", "0 MN m"]), (1.0, ["1.43 kN", "0.429 kN", "0 kN m"])]
+)
+def test_forces_of_a_small_table_are_shown_in_kilonewtons(factor, shown):
+    uses = [LimitUse("push", "A1", 1430.0 * factor, 0.5), LimitUse("pull", "A2", 429.0 * factor, 0.1)]
+    uses.append(LimitUse("axis yaw moment", "yaw", 1e-6, 0.0))  # round-off of a sum
+    peaks = [row[2].replace("\N{NO-BREAK SPACE}", " ") for row in limit_table(uses).rows]
+    assert peaks == shown

@@ -452,6 +452,26 @@ def test_the_command_writes_one_file_and_says_what_it_cannot_show(lhpost6, recor
     ):
         assert refused(lhpost6("view", *wrong, "--export", tmp_path / "other.html"), why)
     assert not (tmp_path / "other.html").exists()
+    for name in ("view.png", "view.mp4", "view"):
+        assert refused(
+            lhpost6("view", RECORD, "--export", tmp_path / name), "a page of HTML is written; name it view.html"
+        )
+        assert not (tmp_path / name).exists()
+
+
+def test_histories_beside_a_shorter_record_are_of_the_interval_that_is_shown(machine, record):
+    """Scale and labels come from what is drawn: the whole record's peaks made a flat line of its quiet beginning."""
+    short = record.isel(time=slice(0, 2048))
+    page = show_record(machine, record, [short]).page
+    packed = json.loads(re.search(r'id="histories">(.*?)</script>', page)[1])
+    last = float(record_frames(machine, record, [short]).time[-1])
+    inside = record["time"].values <= last
+    moved = 1e3 * record["platen_displacement"].values
+    assert np.abs(moved[inside]).max() < 0.5 * np.abs(moved).max()
+    for curve in packed[0]["curves"]:
+        x, y = (np.frombuffer(base64.b64decode(curve[key]), "<f4") for key in "xy")
+        own = moved[inside, AXES.index(curve["name"])].astype("<f4")  # values travel in single precision
+        assert (y.min(), y.max()) == (own.min(), own.max()) and x.max() <= last
 
 
 def test_histories_keep_every_peak_and_leave_out_what_has_gaps(machine, record):

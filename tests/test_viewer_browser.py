@@ -258,6 +258,19 @@ def test_a_pause_ends_with_the_run_and_with_the_last_viewer(plant, machine):
         assert asyncio.run(asyncio.wait_for(pause_and_leave(window), 60))
 
 
+def test_a_browser_without_webgl_says_so_in_place_of_the_table(page, tmp_path):
+    """As with Chromium's --disable-3d-apis: the page was blank but for its legend."""
+    without = "<body><script>HTMLCanvasElement.prototype.getContext = () => null</script>"
+    (tmp_path / "without.html").write_text(Path(page.removeprefix("file://")).read_text().replace("<body>", without, 1))
+
+    async def look(tab: Tab):
+        return await tab.evaluate("[part('undrawn').checkVisibility(), part('undrawn').textContent]")
+
+    seen, words = browse(tmp_path, (tmp_path / "without.html").as_uri(), look)
+    assert seen and "WebGL, which this browser does not provide" in words
+    assert not browse(tmp_path, page, look)[0]
+
+
 def test_histories_move_with_the_animation_and_show_the_force_of_the_leg_pressed(page, tmp_path):
     press = "(x, y) => { for (const type of ['pointerdown', 'pointerup']) document.elementFromPoint(x, y)"
     press += ".dispatchEvent(new PointerEvent(type, { clientX: x, clientY: y, bubbles: true, pointerId: 1 })) }"

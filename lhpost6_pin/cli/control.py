@@ -106,15 +106,16 @@ def replay(
     from ..mechanics.plant import make_plant
     from ..simulation.motion_limits import check_motion_limits
     from ..simulation.rehearse import rehearse
-    from ..tuning.drives import check_circumstances, load_drive, scaled_drive
+    from ..tuning.drives import check_circumstances, load_drive, scaled_drive, scaled_target
 
     table = machine.load(valves)
     settings = opt.find_settings(controller, table)
     options = steps.checked(table)
-    found = scaled_drive(load_drive(drive), scale)
+    iterated = load_drive(drive)
+    found = scaled_drive(iterated, scale)
     check_circumstances(str(drive), found.attrs, table, settings.name)
     if not beyond:
-        check_motion_limits(make_plant(table), found.target)
+        check_motion_limits(make_plant(table), scaled_target(iterated, scale))
     if found.mode != settings.mode:
         raise SimulationError(
             f"{drive} is for reference generators in {found.mode} mode; {settings.name} has {settings.mode} mode"

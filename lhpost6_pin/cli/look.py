@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..core.errors import RecordError
+from ..core.errors import ParameterError, RecordError
 from .app import command, print_result, repeating_command
 from .live_view import ViewOptions, show_address
 from .options import Json, MachineOptions, SpecimenOptions, Valves, folder_for
@@ -43,6 +43,8 @@ def view(
     from ..data.records import load_record
     from ..show.viewer import Look, live_animation, show_record
 
+    if export is not None and export.suffix.lower() not in (".html", ".htm"):
+        raise ParameterError(f"--export {export}: a page of HTML is written; name it {export.stem or 'view'}.html")
     test, over = load_record(record), [load_record(path) for path in others or []]
     table = _mounted(machine, test, record)
     look = Look(fps, options.amplify, gap, options.force_change)

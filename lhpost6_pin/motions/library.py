@@ -130,9 +130,10 @@ def motion_options(name: str) -> tuple[MotionOption, ...]:
 def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> GroundMotion:
     """Ground motion by name or alias, as `list_motions` shows them.
 
-    `options` replace numbers of a test made by name, in SI, as in ``find_motion("ac156", sds=5.0, seed=2)``;
-    `motion_options` lists them. A test whose record is not shipped is read from the user's `files`, as in
-    ``find_motion("tabas", ["x.AT2", "y.AT2", "z.AT2"])``; files and options are then those of `load_motion`.
+    `options` replace numbers of a test made by name, in SI or as text with a unit, as in
+    ``find_motion("ac156", sds="0.5 g", seed=2)``; `motion_options` lists them. A test whose record is not shipped is
+    read from the user's `files`, as in ``find_motion("tabas", ["x.AT2", "y.AT2", "z.AT2"])``; files and options are
+    then those of `load_motion`.
 
     Raises UnknownNameError for a name that does not exist, MotionError for an option the motion does not
     take, a value that it cannot have (named), numbers that do not go together, files that cannot be read or are
@@ -157,7 +158,8 @@ def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> Ground
         return load_pulse_record(package["module"], package["file"], number, name=entry.name, title=entry.title)
     numbers = values_of(tests, entry.name)
     del numbers["kind"], numbers["title"]
-    chosen = checked_options(name, numbers, options)
+    units = {option.name: option.unit for option in options_of(tests, entry.name)} if options else {}
+    chosen = checked_options(name, numbers, units, options)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # GroundMotion refuses what becomes infinite
             return _GENERATORS[entry.kind](name=entry.name, **{**numbers, **chosen})

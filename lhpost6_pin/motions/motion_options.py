@@ -1,12 +1,14 @@
 """Options of the motions made by name, and checks of their values."""
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.errors import MotionError
+from ..core.units import parse_unit
 from .motion import AXES
 from .toml import si_unit, values_of
 
@@ -14,6 +16,7 @@ __all__ = ["MotionOption", "checked_options", "options_of"]
 
 _MAY_BE_ZERO = ("height_ratio", "seed")
 _WHOLE = ("seed",)
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
 
 class MotionOption(NamedTuple):
@@ -35,17 +38,23 @@ def options_of(tests: dict[str, Any], section: str) -> tuple[MotionOption, ...]:
     )
 
 
-def checked_options(name: str, defaults: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options of motion `name`, each of the type of its default and possible by itself.
+def checked_options(
+    name: str, defaults: Mapping[str, Any], units: Mapping[str, str], options: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Options of motion `name` in SI, each of the type of its default and possible by itself.
 
-    Lists may be given as text, "0.5, 0.5, 0.9"; switches as "true" or "false". Raises MotionError naming the
-    option whose value is not a finite positive number (zero where that makes sense), axis or switch.
+    `units` are those of SI, by option. Numbers may be given as text with another unit of the same dimension, "50 mm",
+    lists as text, "0.5, 0.5, 0.9", with a unit of each or at the end, switches as "true" or "false". Raises MotionError
+    naming the option, with its unit, whose value is not a finite positive number (zero where that makes sense), axis
+    or switch.
     """
-    return {key: _checked(f"{name}: option {key}", key, defaults[key], value) for key, value in options.items()}
+    return {
+        key: _checked(f"{name}: option {key} is {value!r}; give", key, defaults[key], units[key], value)
+        for key, value in options.items()
+    }
 
 
-def _checked(where: str, key: str, default: Any, value: Any) -> Any:
-    problem = f"{where} is {value!r}; give"
+def _checked(problem: str, key: str, default: Any, unit: str, value: Any) -> Any:
     if isinstance(default, bool):
         if str(value).lower() not in ("true", "false"):
             raise MotionError(f"{problem} true or false")
@@ -54,18 +63,37 @@ def _checked(where: str, key: str, default: Any, value: Any) -> Any:
         if value not in AXES:
             raise MotionError(f"{problem} one of {', '.join(AXES)}")
         return value
+    known = f", in {unit} or followed by a unit of the same kind" if unit != "1" else ""
+    value = _in_si(value, unit) if isinstance(value, str) and key not in _WHOLE else value
     if isinstance(default, list):
         items = value.split(",") if isinstance(value, str) else np.ravel(np.asarray(value, dtype=object))
         numbers = [_number(item) for item in items]
         if len(numbers) not in (1, len(default)) or not all(0 < number < math.inf for number in numbers):
-            raise MotionError(f"{problem} {len(default)} finite positive numbers, or one for all")
+            raise MotionError(f"{problem} {len(default)} finite positive numbers, or one for all{known}")
         return numbers * len(default) if len(numbers) == 1 else numbers
     least = "zero or more" if key in _MAY_BE_ZERO else "above zero"
     number = math.nan if isinstance(value, str) else _number(value)
     possible = 0 < number < math.inf or (number == 0 and key in _MAY_BE_ZERO)
     if not possible or (key in _WHOLE and not number.is_integer()):
-        raise MotionError(f"{problem} a {'whole' if key in _WHOLE else 'finite'} number, {least}")
+        raise MotionError(f"{problem} a {'whole' if key in _WHOLE else 'finite'} number, {least}{known}")
     return int(number) if key in _WHOLE else value
+
+
+def _in_si(text: str, unit: str) -> Any:
+    """Number of a text, or list of them, converted to the SI `unit`; the text itself if a unit is missing or unfit."""
+    found = [_QUANTITY.fullmatch(item) for item in text.split(",")]
+    stated = [match[2] if match else "" for match in found]
+    if not any(stated[:-1]):  # the last one is of all
+        stated = stated[-1:] * len(stated)
+    known, wanted = [parse_unit(word) if word else None for word in stated], parse_unit(unit)
+    numbers = [
+        float(match[1]) * own.factor
+        for match, own in zip(found, known, strict=True)
+        if match and own and wanted and own[1:] == wanted[1:]
+    ]
+    if len(numbers) < len(found):
+        return text
+    return numbers if len(numbers) > 1 else numbers[0]
 
 
 def _number(value: Any) -> float:

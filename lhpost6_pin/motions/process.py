@@ -123,7 +123,8 @@ def make_target(
     (begin, end) [s] cuts a part of it. Corners [Hz] of the zero-phase band-pass default to the values in
     `models/ground_motions/tests.toml`, the high-pass over the motion's time scale; a displacement motion is not
     high-passed by default. The record is extended by `pad` [s] at both ends, over which the target comes from and goes
-    to rest. `rate` is the controller's [1/s].
+    to rest; that of the file is times a time scale above 1, as displacements at the ends are times its square. `rate`
+    is the controller's [1/s].
 
     A displacement motion that does not begin and end at rest has a pulse of acceleration there; unless `warn` is False,
     a warning is logged of one that exceeds the motion's own (`joins`).
@@ -135,7 +136,7 @@ def make_target(
     if high_pass is None:
         high_pass = settings["high_pass"] / motion.time_scale if integrated else 0.0
     low_pass = settings["low_pass"] if low_pass is None else low_pass
-    pad = settings["pad"] if pad is None else pad
+    pad = settings["pad"] * max(motion.time_scale, 1.0) if pad is None else pad
     pairs = axes_map(",".join(AXES) if axes is None else axes)
     if not (isinstance(scale, Real) and np.isfinite(scale)):
         raise MotionError(f"{motion.name}: scale is {scale!r}; give a finite number")

@@ -35,7 +35,7 @@ def load_spectrum(path: Path | str, damping: float | None = None) -> TargetSpect
     damping = processing()["damping"] if damping is None else damping
     if not 0 <= damping < 1:
         raise MotionError(f"{where}: damping is {damping}; give a share of critical damping, such as 0.05")
-    rows = without_comments(read_text(path))
+    rows = without_comments(read_text(path, "response spectrum"))
     if len(rows) < 3:
         raise MotionError(f"{where}: fewer than two rows of a spectrum below a header row; {EXAMPLE}")
     (line, header), rows = rows[0], rows[1:]

@@ -22,15 +22,15 @@ Rows = Sequence[tuple[int, str]]
 """Lines that are not blank, each with its number in the file, from 1."""
 
 
-def read_text(path: "Path | str") -> str:
-    """Text of a file; raises MotionError when it is missing, unreadable or not text.
+def read_text(path: "Path | str", what: str = "ground motion") -> str:
+    """Text of a file of `what`; raises MotionError when it is missing, unreadable or not text.
 
     Lines that end twice (CR CR LF, after a transfer between systems) end once.
     """
     try:
         data = Path(path).read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL in it
-        raise MotionError(f"cannot read ground motion {path}: {reason_of(error)}") from error
+        raise MotionError(f"cannot read {what} {path}: {reason_of(error)}") from error
     if b"\0" in data[:4096]:
         raise MotionError(f"{path}: not a text file, of unknown format; known are {READABLE}")
     return re.sub(r"\r+\n", "\n", data.decode("utf-8-sig", errors="replace"))

@@ -72,11 +72,9 @@ def judged(plant: Plant, record: xr.Dataset) -> tuple[tuple[Peak, ...], str]:
         return (), ""
     if found.fits is None:
         return found.peaks, ""
-    worst = found.governing
     return found.peaks, (
-        f"The largest scale of this target within all limits is {found.fits:g}; it was run at "
-        f"{float(record.attrs['scale']):g}. Of the achieved motion {worst.name} {worst.quantity} governs, at "
-        f"{100 * worst.utilisation:.3g} % of its limit."
+        f"The largest scale of this target within all limits, less their reserves, is {found.fits:g}; it was run at "
+        f"{float(record.attrs['scale']):g}. What the achieved motion demands of each is in “Demand over capacity”."
     )
 
 

@@ -126,7 +126,9 @@ def print_motions(name: str | None = None) -> None:
         return
     found = motion_entry(name)
     options = Table(
-        "Options, each as --set key=value", ("option", "default", "unit", "source"), motion_options(found.name)
+        "Options, each as --set key=value, in the unit shown or followed by its own (50mm)",
+        ("option", "default", "unit", "source"),
+        motion_options(found.name),
     )
     remedy = found.request or (f"not installed: {found.remedy}" if found.remedy else "")
     print_blocks(f"{found.name}: {found.title}", options if options.rows else "options: none", remedy)

@@ -102,11 +102,6 @@ class Judgement(NamedTuple):
     peaks: tuple[Peak, ...]
     fits: float | None  # None: no target
 
-    @property
-    def governing(self) -> Peak:
-        """The largest demand over capacity."""
-        return max((p for p in self.peaks if p.decides), key=lambda p: p.utilisation)
-
 
 def judge_motion(plant: Plant, motion: PlatenMotion, target: Target | None = None) -> Judgement:
     """Demands of an achieved motion on all limits, none refused; raises as `make_motion_check` does.

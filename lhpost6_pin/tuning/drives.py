@@ -23,7 +23,7 @@ from ..machine.machine import Machine
 from ..machine.parameters import LARGEST, unusable
 from ..motions import Reference, Target
 
-__all__ = ["Drive", "check_circumstances", "circumstances", "load_drive", "save_drive", "scaled_drive"]
+__all__ = ["Drive", "check_circumstances", "circumstances", "load_drive", "save_drive", "scaled_drive", "scaled_target"]
 
 log = logging.getLogger(__name__)
 
@@ -138,3 +138,10 @@ def scaled_drive(drive: Drive, factor: float) -> Drive:
     moved = {name: factor * getattr(target, name) for name in _UNITS}
     reference = replace(target.reference, scale=factor * target.reference.scale)
     return drive._replace(values=factor * drive.values, target=replace(target, reference=reference, **moved))
+
+
+def scaled_target(drive: Drive, factor: float) -> Target:
+    """Target of `scaled_drive` whose `reference.scale` is the factor, so that a scale that fits is a factor, too."""
+    target, made = scaled_drive(drive, factor).target, drive.target.reference
+    named = f"the drive of {made.motion}, iterated at scale {made.scale:g},"
+    return replace(target, reference=replace(made, motion=named, scale=factor))

@@ -11,7 +11,7 @@ from ...data.metrics import channel, kinds, labels, peaks, sampling
 from ...simulation.limit_use import TOLERANCE, Limits, force_use, shares_of_limit
 from .page import Block, Figure, Table, bar, missing, number
 from .plots import SUPPLY, Row, Trace, palette_traces, time_figure
-from .scales import SCALES
+from .scales import SCALES, load_scale
 
 __all__ = ["draw_over_time", "force_blocks", "pressure_blocks", "specimen_blocks", "strut_blocks"]
 
@@ -117,8 +117,9 @@ def _with_force_limits(row: Row, record: xr.Dataset, limits: Limits) -> Row:
 
 def _use_of_actuators(record: xr.Dataset, limits: Limits) -> Table:
     columns: list[tuple[str, Sequence[object]]] = [("Actuator", labels(record, "actuator"))]
-    for words, peak, share in force_use(record, limits):
-        scale = SCALES["force"]
+    uses = force_use(record, limits)
+    scale = load_scale("force", max((float(np.nanmax(use.peak, initial=0.0)) for use in uses), default=0.0))
+    for words, peak, share in uses:
         columns.append((f"Peak {words} [{scale.unit}]", [number(value * scale.factor) for value in peak]))
         if "actuator_force" in limits or "actuator_pull" in limits:
             columns.append(("Demand / capacity", [bar(value, TOLERANCE) for value in share]))
@@ -138,9 +139,11 @@ def _channel_by_kind(record: xr.Dataset, title: str, name: str, dim: str, scale:
 
 def _rows_by_kind(title: str, values: Array, names: Sequence[str], scale: str) -> list[Row]:
     """One row per kind of component: H1 to H4 in one, V1 to V6 in the next."""
-    rows = []
+    rows, shown = [], SCALES[scale]
+    if scale == "force":
+        shown = load_scale(scale, float(np.nanmax(np.abs(values), initial=0.0)))
     for own in kinds(names):
         span = names[own[0]] if len(own) == 1 else f"{names[own[0]]}–{names[own[-1]]}"
         traces = palette_traces([names[k] for k in own], values[:, own])
-        rows.append(Row(f"{title} {span}", traces, SCALES[scale]))
+        rows.append(Row(f"{title} {span}", traces, shown))
     return rows

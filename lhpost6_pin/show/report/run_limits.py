@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from ...motions import Peak
 from ...simulation.limit_use import TOLERANCE, LimitUse, all_uses_of_peaks, governing_limits
 from .page import Block, Table, bar, number
-from .scales import SCALES, axis_scale, shown_as
+from .scales import SCALES, axis_scale, load_scale, shown_as
 
 __all__ = ["NOT_EVALUATED", "demand_table", "limit_blocks", "limit_table", "only_spools"]
 
@@ -50,9 +50,12 @@ def demand_table(peaks: Iterable[Peak]) -> Table:
 
 def limit_table(uses: Sequence[LimitUse], title: str = "Demand over capacity, achieved") -> Table:
     """Return the largest demand over capacity of each quantity, the governing limit first."""
-    rows = []
-    for use in governing_limits(uses):
-        scale = SCALES[SHOWN[use.quantity]] if use.quantity in SHOWN else axis_scale(use.name, use.quantity)
+    rows, governing = [], governing_limits(uses)
+    loads = ("force", "moment")
+    largest = max((use.peak for use in governing if SHOWN.get(use.quantity) in loads), default=0.0)
+    scales = SCALES | {load: load_scale(load, largest) for load in loads}
+    for use in governing:
+        scale = scales[SHOWN[use.quantity]] if use.quantity in SHOWN else axis_scale(use.name, use.quantity)
         peak = f"{number(use.peak, 3)} of the stroke" if use.quantity == "spool" else shown_as(use.peak, scale)
         rows.append((use.quantity.capitalize(), use.name, peak, bar(use.share, TOLERANCE)))
     return Table(title, ("Limit", "Governing", "Peak", "Demand / capacity"), rows)

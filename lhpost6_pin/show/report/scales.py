@@ -16,6 +16,7 @@ __all__ = [
     "decibels",
     "degrees",
     "force_scale",
+    "load_scale",
     "late_or_ahead",
     "milliseconds",
     "percent",
@@ -38,6 +39,7 @@ class Scale:
 
     factor: float
     unit: str
+    round_off: float = ROUND_OFF  # in `unit`
 
 
 SCALES: dict[str, Scale] = {
@@ -66,6 +68,18 @@ def force_scale(axis: str) -> Scale:
     return Scale(1e-3, "kN m" if axis in ROTATIONS else "kN")
 
 
+SMALL_LOAD = 1e5
+"""Force [N] or moment [N m] below which the largest of a table is shown in thousands, not in millions."""
+
+
+def load_scale(quantity: str, largest: float) -> Scale:
+    """Return how forces or moments ("force", "moment") of a table are shown, the largest [N, N m] of which is given."""
+    scale = SCALES[quantity]
+    if not largest < SMALL_LOAD:
+        return scale
+    return Scale(1e3 * scale.factor, scale.unit.replace("MN", "kN"), 1e3 * scale.round_off)
+
+
 def axis_title(axis: str) -> str:
     """Return the heading of an axis."""
     return f"Axis {axis} ({DIRECTIONS[axis]})" if axis in DIRECTIONS else f"Axis {axis}"
@@ -83,11 +97,11 @@ def shown_as(value: float, scale: Scale) -> str:
 
 def scaled_number(value: float, scale: Scale) -> str:
     """Return an SI value as a number in the unit it is shown in."""
-    return _visible(value * scale.factor)
+    return _visible(value * scale.factor, scale.round_off)
 
 
-def _visible(value: float) -> str:
-    return number(0.0 if abs(value) < ROUND_OFF else value)
+def _visible(value: float, round_off: float = ROUND_OFF) -> str:
+    return number(0.0 if abs(value) < round_off else value)
 
 
 def milliseconds(seconds: float) -> str:

@@ -195,8 +195,8 @@ def _smallest_before(tuning: Tuning) -> str:
 
 def _limits(tuning: Tuning) -> list[Block]:
     how = (
-        "Within its band each axis meets the tolerance. The band is limited, according to the response measured at "
-        "the next frequency, by:"
+        "Within its band each axis meets the tolerance. Limitation of each band, according to the response measured at "
+        "the next frequency:"
     )
     reasons = (f"{a.axis}, {_band(a.band_after)}: {a.limited_by or 'no cause identified'}" for a in tuning.axes)
     return [how, bullet_list(reasons)]

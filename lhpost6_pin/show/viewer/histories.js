@@ -36,13 +36,15 @@ function choose(name) { // the leg whose force is drawn
   forces.chosen = forces.choice.value = name;
   sketch(forces);
 }
+const LEAST = 1e-9; // in the unit of a title: below it is rounding of a platen at rest
+const label = (value) => (Math.abs(value) > LEAST ? value : 0).toPrecision(3);
 function sketch({ canvas, field, curves, one, chosen }) {
   const sharp = window.devicePixelRatio, width = field.clientWidth, height = field.clientHeight;
   [canvas.width, canvas.height] = [width * sharp, height * sharp];
   const pen = canvas.getContext("2d"), drawn = curves.filter(({ name }) => !one || name === chosen);
   let low = Infinity, high = -Infinity;
   for (const { y } of drawn) for (const value of y) { low = Math.min(low, value); high = Math.max(high, value); }
-  const span = high - low || 1;
+  const span = high - low > LEAST ? high - low : 1;
   const across = (x) => (x / known) * width, up = (y) => height - 3 - ((y - low) / span) * (height - 6);
   pen.scale(sharp, sharp);
   pen.lineWidth = 1;
@@ -54,8 +56,8 @@ function sketch({ canvas, field, curves, one, chosen }) {
   }
   pen.font = "11px system-ui, sans-serif";
   pen.fillStyle = "#57606a";
-  pen.fillText(high.toPrecision(3), 2, 11);
-  pen.fillText(low.toPrecision(3), 2, height - 3);
+  pen.fillText(label(high), 2, 11);
+  pen.fillText(label(low), 2, height - 3);
 }
 function show_histories() { // once the animation is known, and when the window changes
   part("strip").hidden = known === 0 || plots.length === 0;

@@ -11,7 +11,7 @@ from ...core.arrays import Array
 from ...core.names import AXES
 from ...machine.machine import Machine
 from ..report.plots import CYCLE, envelope
-from ..report.scales import SCALES
+from ..report.scales import SCALES, load_scale
 from ..urdf import legs
 from .frames import recorded_forces
 
@@ -41,8 +41,9 @@ def record_histories(machine: Machine, record: xr.Dataset) -> list[History]:
             found.append(History(f"{quantity.capitalize()} of C [{scale.unit}]", time, curves))
     if (force := recorded_forces(machine, record)) is not None:
         names = [leg.name for leg in legs(machine)]
-        curves = dict(zip(names, SCALES["force"].factor * force.T, strict=True))
-        found.append(History(f"Force [{SCALES['force'].unit}], push positive", time, curves, one=True))
+        scale = load_scale("force", float(np.nanmax(np.abs(force), initial=0.0)))
+        curves = dict(zip(names, scale.factor * force.T, strict=True))
+        found.append(History(f"Force [{scale.unit}], push positive", time, curves, one=True))
     whole = [h._replace(curves={n: c for n, c in h.curves.items() if np.isfinite(c).all()}) for h in found]
     return [history for history in whole if history.curves]
 

@@ -1,6 +1,12 @@
 // The page's own part: meshcat's commands into its viewer, and a bar that drives meshcat's animation.
-const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
 const part = (id) => document.getElementById(id);
+let viewer = null;
+try {
+  viewer = new MeshCat.Viewer(part("meshcat-pane"));
+} catch (why) {
+  part("undrawn").hidden = false;
+  throw why;
+}
 for (const packed of JSON.parse(part("commands").textContent))
   viewer.handle_command_bytearray(Uint8Array.from(atob(packed), (c) => c.charCodeAt(0)));
 const { start, step, live, bare } = JSON.parse(part("settings").textContent);

@@ -83,6 +83,8 @@ def _caption(machine: Machine, record: xr.Dataset, others: Sequence[xr.Dataset],
         note += f"; longest arrow {most / 1e3:,.0f} kN" + " of change since the start" * look.change
         legend |= {"push": drawing_colour("force_push"), "pull": drawing_colour("force_pull")}
         layers["forces"] = [f"meshcat/{ROOT}/{name}_rod/force" for name in forces]
-    start = float(frames.time[0])
-    histories = packed_histories(record_histories(machine, record), start)
+    start, end = float(frames.time[0]), float(frames.time[-1])
+    time = record["time"].values
+    shown = record.isel(time=(time >= start) & (time <= end))
+    histories = packed_histories(record_histories(machine, shown), start)
     return Caption(record_title(record), note, legend, layers, start, 1.0 / look.rate, histories)

@@ -4,7 +4,8 @@
 
 Starts a panel, takes its controls over the websocket, raises the platen and runs the sine; a page in Chromium without a
 window watches meanwhile, whose frames are counted. Prints the share of samples that were missed or late, safe holds and
-frames a second, and writes panel_pace.json. Chromium without a window draws WebGL by the processor, which takes time
+frames a second, and writes panel_pace.json; beside it, measured before, the share of samples for which a process that
+does nothing else is woken too late by this computer (`bare`), below which no panel can be. Chromium without a window draws WebGL by the processor, which takes time
 that it does not take where a graphics card draws; --no-view leaves the 3-D view out of the page.
 """
 
@@ -13,7 +14,9 @@ import json
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,8 +26,11 @@ from browser import BROWSER, Tab, browse
 from tornado.websocket import websocket_connect
 
 from lhpost6_pin.core.files import refuse_folder, write_whole
+from lhpost6_pin.core.names import SAMPLE_RATE
+from lhpost6_pin.panel.worker import come_first
 
 SIZE = (1300, 900)
+ALONE = 60.0  # [s] for which the computer is measured without a panel
 PATIENCE = 120.0  # [s] for the start, and for a page to load
 COUNT_FRAMES = """{
   window.drawn = [];
@@ -98,6 +104,18 @@ async def watch(url: str, minutes: float, view: bool, tab: Tab | None) -> dict[s
     }
 
 
+def bare(seconds: float) -> float:
+    """Share of the instants of a panel's samples to which a process that only sleeps is later than one sample."""
+    late, start = 0, time.perf_counter()
+    samples = round(seconds * SAMPLE_RATE)
+    for k in range(samples):
+        due = start + k / SAMPLE_RATE
+        while (left := due - time.perf_counter()) > 0.0:
+            time.sleep(left)
+        late += -left > 1.0 / SAMPLE_RATE
+    return late / samples
+
+
 def frames_per_second(times: list[float]) -> dict[str, float]:
     """Mean of all frames, and the fewest in any second."""
     each = np.bincount(((np.array(times) - times[0]) / 1000.0).astype(int))[:-1]
@@ -114,6 +132,8 @@ def main(
     if page and BROWSER is None:
         raise SystemExit("error: no Chromium on this computer; --no-page measures without one")
     refuse_folder(out)
+    with ProcessPoolExecutor(1, initializer=come_first) as alone:
+        woken_late = alone.submit(bare, ALONE).result()
     command = [sys.executable, "-c", "from lhpost6_pin.cli import main; main()", "panel", "--no-open"]
     command += ["--out", str(out / "panel")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as panel:
@@ -128,6 +148,7 @@ def main(
                 found = asyncio.run(watch(url, minutes, view, None))
         finally:
             panel.terminate()
+    found["bare"] = woken_late
     if frames := found.pop("frames"):
         found["frames"] = frames_per_second(frames)
     text = json.dumps(found, indent=2)

@@ -28,7 +28,7 @@ from .programs import Program, Recorded
 from .ring import Ring
 from .rows import Rows
 
-__all__ = ["Setup", "control", "panel_numbers", "program_of", "rows_of", "serve_plant"]
+__all__ = ["Setup", "come_first", "control", "panel_numbers", "program_of", "rows_of", "serve_plant"]
 
 _IDLE = 0.1  # [s] between looks at orders
 _POLL = 150e-6  # [s] of polling for the sensors of a plant that catches up
@@ -239,10 +239,14 @@ class _Controller:
 
 
 def _first(pace: float) -> None:
-    """In real time come before other processes where the system allows it; Ctrl-C is for the page's process."""
+    """In real time come before other processes; Ctrl-C is for the page's process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if pace < 1.0:
-        return
+    if pace >= 1.0:
+        come_first()
+
+
+def come_first() -> None:
+    """Let this process come before others where the system allows it."""
     with suppress(AttributeError, OSError):  # another system, or no right to it
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(os.sched_get_priority_min(os.SCHED_RR)))
 

@@ -5,8 +5,9 @@
 Starts a panel, takes its controls over the websocket, raises the platen and runs the sine; a page in Chromium without a
 window watches meanwhile, whose frames are counted. Prints the share of samples that were missed or late, safe holds and
 frames a second, and writes panel_pace.json; beside it, measured before, the share of samples for which a process that
-does nothing else is woken too late by this computer (`bare`), below which no panel can be. Chromium without a window draws WebGL by the processor, which takes time
-that it does not take where a graphics card draws; --no-view leaves the 3-D view out of the page.
+does nothing else is woken too late by this computer (`bare`), below which no panel can be. Chromium without a window
+draws WebGL by the processor, which takes time that it does not take where a graphics card draws; --no-view leaves the
+3-D view out of the page.
 """
 
 import asyncio

@@ -13,7 +13,8 @@ from ..data.records import is_measured
 from ..effects.registry import law_of, states_of
 from ..machine.parameters import load_parameters
 from ..mechanics.plant import Plant
-from .inverse_dynamics import with_loads
+from ..mechanics.pose import plant_motion
+from .inverse_dynamics import leg_wrenches, with_loads
 from .prepare import MeasuredTest, actuator_forces
 from .residual_kernels import row_wrenches
 from .residuals import Path, evaluate_residuals, follow
@@ -26,17 +27,27 @@ APART = 0.5
 ROUNDS = 3
 """Estimates: size and correlation of the error that weighs one are of what the one before leaves."""
 
+MOST_ROUNDS, STEP, SETTLED = 20, 1e-3, 1e-6
+"""Of a record without noise: Gauss-Newton steps at most, the difference by which states are varied in them, and the
+largest change of a state at which they end: the law of Bouc and Wen is strongly curved near full friction."""
+
+BALANCED, SHOWN = 1e-4, 1e-2
+"""Residual over measured wrench of an axis up to which a record without noise is in balance as it is; and variation of
+an axis over that of the largest, forces and moments alike, below which its residual counts as of one so large."""
+
 
 def start_deviation() -> float:
     """Prior standard deviation of a state at the start, of full friction (`models/procedures/decompose.toml`)."""
-    return load_parameters(models_folder() / "procedures" / "decompose.toml").number("friction.held")
+    return _number("friction.held")
 
 
-def start_wrenches(plant: Plant, test: MeasuredTest, path: Path | None = None) -> tuple[Array, NDArray[np.intp]]:
+def start_wrenches(
+    plant: Plant, test: MeasuredTest, path: Path | None = None, *, about: Array | None = None, apart: float = APART
+) -> tuple[Array, NDArray[np.intp]]:
     """Wrenches (n, 6, k) on the platen at C in {c} [N, N m] by a unit of each of k states at the start; their places.
 
-    path is that of `follow`, if it is known. There are none (k = 0) where forces are not measured, as there is no
-    balance of them.
+    They are differences between states `apart` above and below `about` (n_states,), by default zero. path is that of
+    `follow`, if it is known. There are none (k = 0) where forces are not measured, as there is no balance of them.
     """
     force, rows = actuator_forces(plant.machine, test.channels), _friction_rows(plant)
     if force is None or not len(rows):
@@ -48,29 +59,30 @@ def start_wrenches(plant: Plant, test: MeasuredTest, path: Path | None = None) -
         some = rows[[size > nth for size in sizes]]
         own = [states_of(row).start + nth for row in some]
         sides = []
-        for start in (APART, -APART):
-            state = np.zeros(len(plant.states))
-            state[own] = start
+        for change in (apart, -apart):
+            state = np.zeros(len(plant.states)) if about is None else about.copy()
+            state[own] += change
             began = follow(plant, test, known, start=state)
             z = with_loads(plant, began.ports, began.required, began.z, force)
             sides.append(row_wrenches(plant, began.ports, z, some))
-        found.append((sides[0] - sides[1]) / (2.0 * APART))
+        found.append((sides[0] - sides[1]) / (2.0 * apart))
         places += own
     return np.concatenate(found, axis=1).swapaxes(1, 2), np.array(places)
 
 
 def estimate_start(plant: Plant, test: MeasuredTest, cutoff: float) -> Array:
-    """Friction's states (n_states,) at the start of a measured test, by the balance of forces up to `cutoff` [Hz].
+    """Friction's states (n_states,) at the start of a test, by the balance of forces up to `cutoff` [Hz].
 
-    The most probable ones, with the prior of `start_deviation` and an error of the balance that is, on each axis, as
+    In a measured test the most probable ones, with the prior of `start_deviation` and an error of the balance that is, on each axis, as
     large as what remains of it, and as correlated from sample to sample (an autoregression of first order, after
-    Cochrane and Orcutt, 1949). Zero in a simulated test, and where forces are not measured. Means over the test count
-    for nothing: a force that stays may be the offset of a sensor.
+    Cochrane and Orcutt, 1949). Means over the test count for nothing: a force that stays may be the offset of a sensor.
+    In a simulated test those that balance its forces, if states of zero do not (`friction.held_gain` of
+    `decompose.toml`), else zero. Zero where forces are not measured.
     """
     out = np.zeros(len(plant.states))
-    if not is_measured(test.record):
-        return out
     path = follow(plant, test)
+    if not is_measured(test.record):
+        return _without_noise(plant, test, path)
     wrenches, places = start_wrenches(plant, test, path)
     if not len(places):
         return out
@@ -90,15 +102,63 @@ def estimate_start(plant: Plant, test: MeasuredTest, cutoff: float) -> Array:
         rows = (_new(slopes, share[:, None]) / error[:, None]).reshape(-1, len(places))
         found = np.linalg.solve(rows.T @ rows + prior, rows.T @ (_new(rest, share) / error).ravel())
     out[places] = found
+    return _limited(plant, out)
+
+
+def _without_noise(plant: Plant, test: MeasuredTest, path: Path) -> Array:
+    """States (n_states,) at the start that balance the forces of a record without noise, by Gauss and Newton.
+
+    The prior decides between states that the balance does not distinguish. Zero where they leave more than a share of
+    the squares that zero leaves: then it is not the start that the balance lacks.
+    """
+    zero = state = np.zeros(len(plant.states))
+    force = actuator_forces(plant.machine, test.channels)
+    if force is None or not len(_friction_rows(plant)):
+        return zero
+    residual = evaluate_residuals(plant, test, ("wrench",), path=path).wrench[:, plant.axes]
+    measured = leg_wrenches(plant, plant_motion(plant, test.motion).q, force).sum(axis=1)[:, plant.axes]
+    size = np.std(measured, axis=0)
+    size = np.maximum(size, SHOWN * size.max())
+    least = before = float(np.sum((residual / size) ** 2))
+    if before <= BALANCED**2 * residual.size:
+        return zero
+    best, apart = zero, APART
+    for _ in range(MOST_ROUNDS):
+        slopes, places = start_wrenches(plant, test, path, about=state, apart=apart)
+        error = np.sqrt(np.mean(residual**2, axis=0)) + BALANCED * size
+        rows = (slopes[:, plant.axes] / error[:, None]).reshape(-1, len(places))
+        prior = np.eye(len(places)) / start_deviation() ** 2
+        pull = rows.T @ (residual / error).ravel() - prior @ state[places]
+        changed = state.copy()
+        changed[places] += np.linalg.solve(rows.T @ rows + prior, pull)
+        step, state, apart = state, _limited(plant, changed), STEP
+        began = follow(plant, test, (plant, path), start=state)
+        residual = evaluate_residuals(plant, test, ("wrench",), path=began).wrench[:, plant.axes]
+        left = float(np.sum((residual / size) ** 2))
+        if left < least:
+            least, best = left, state
+        if np.abs(state - step).max() < SETTLED:
+            break
+    return best if least * _number("friction.held_gain") <= before else zero
+
+
+def _limited(plant: Plant, states: Array) -> Array:
+    """The states (n_states,) with no more than full friction in each row."""
+    out = states.copy()
     for row in _friction_rows(plant):
         own = out[states_of(row)]
-        own /= max(float(np.linalg.norm(own)), 1.0)  # no more than full friction
+        own /= max(float(np.linalg.norm(own)), 1.0)
     return out
 
 
 def largest_share(plant: Plant, start: Array) -> float:
     """Largest share of its friction that a seal or pad holds with the states `start` (n_states,)."""
     return max((float(np.linalg.norm(start[states_of(row)])) for row in _friction_rows(plant)), default=0.0)
+
+
+def _number(path: str) -> float:
+    """Number of `models/procedures/decompose.toml`."""
+    return load_parameters(models_folder() / "procedures" / "decompose.toml").number(path)
 
 
 def _friction_rows(plant: Plant) -> NDArray[np.void]:

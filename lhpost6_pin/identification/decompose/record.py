@@ -161,7 +161,7 @@ def decompose_test(
 
     The equations are those of the table without specimen; the wrench of a specimen on the plant is an effect, as its
     model predicts it, or as its floors' accelerations show it where they were measured. start (n_states,) are the
-    states of friction at the start; by default those of `estimate_start` in a measured test, zero in a simulated one.
+    states of friction at the start; by default those of `estimate_start`.
     """
     mounted, plant = plant, bare(plant)
     record, force = test.record, actuator_forces(plant.machine, test.channels)

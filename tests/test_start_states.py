@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from lhpost6_pin.control import load_controller
+from lhpost6_pin.core.errors import RecordError
 from lhpost6_pin.core.names import AXES, SAMPLE_RATE
+from lhpost6_pin.data.campaign import Campaign
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.effects.registry import law_of, states_of
@@ -20,6 +22,7 @@ from lhpost6_pin.identification.friction_start import estimate_start, largest_sh
 from lhpost6_pin.identification.prepare import AS_RECORDED, prepare_test
 from lhpost6_pin.identification.inverse_dynamics import leg_wrenches
 from lhpost6_pin.identification.residuals import evaluate_residuals, follow
+from lhpost6_pin.identification.validation import validate
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import plant_motion
@@ -194,3 +197,34 @@ def test_decompose_finds_a_recording_after_a_motion_exact_and_states_what_fricti
     assert any(note.startswith("Seals or pads hold up to") for note in found.notes)
     worst = np.abs(found.forces.residual).max(axis=0) / np.abs(found.forces.measured).max(axis=0)
     assert worst[0] < EXACT and worst[4] < EXACT
+
+
+# ---------------------------------------------------------------------------------------------- up to a trip
+def tripped(run):
+    """The run as a recording that tripped in its motion, after which forces are not of its motion."""
+    force = run["actuator_force"].values.copy()
+    force[9 * SAMPLE_RATE :] += 1e5
+    return run.assign(actuator_force=run["actuator_force"].copy(data=force)).assign_attrs(
+        trouble="tripped at 9.000 s: z displacement beyond its interlock"
+    )
+
+
+def test_decompose_uses_a_recording_up_to_its_trip_and_states_it(run):
+    found = decompose_record(load_machine(), tripped(run))
+    assert found.notes[0].startswith("tripped at 9.000 s: z displacement")
+    assert found.record.sizes["time"] == 9 * SAMPLE_RATE
+    worst = np.abs(found.forces.residual).max(axis=0) / np.abs(found.forces.measured).max(axis=0)
+    assert np.all(worst[[0, 2, 4]] < EXACT)  # of the axes that bear a force
+
+
+def test_decompose_refuses_a_recording_that_tripped_before_it_began(run):
+    with pytest.raises(RecordError, match=r"s are too short"):
+        decompose_record(load_machine(), run.assign_attrs(trouble="tripped before the recording began: by Anna"))
+
+
+def test_validate_uses_a_recording_up_to_its_trip_and_states_it(run, caplog):
+    found = validate(load_machine(), Campaign("c", (tripped(run),)), phases=(1,), jobs=1)
+    assert "test sine tripped at 9.000 s" in caplog.text
+    (phase,) = found.phases
+    assert phase.notes[0].startswith("tripped at 9.000 s") and len(phase.time) == 9 * SAMPLE_RATE
+    assert max(a.rrmse_aligned for a in phase.of("wrench") if a.moves) < EXACT

@@ -118,6 +118,8 @@ def _without_noise(plant: Plant, test: MeasuredTest, path: Path) -> Array:
     residual = evaluate_residuals(plant, test, ("wrench",), path=path).wrench[:, plant.axes]
     measured = leg_wrenches(plant, plant_motion(plant, test.motion).q, force).sum(axis=1)[:, plant.axes]
     size = np.std(measured, axis=0)
+    if not size.any():
+        return zero
     size = np.maximum(size, SHOWN * size.max())
     least = before = float(np.sum((residual / size) ** 2))
     if before <= BALANCED**2 * residual.size:

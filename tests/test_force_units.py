@@ -263,7 +263,14 @@ def test_right_forces_of_a_slow_sine_are_not_doubted(axis, amplitude, period):
 
 @pytest.mark.parametrize(
     ("axis", "amplitude", "period"),
-    [("z", 0.03, 1.5), ("z", 0.05, 2.0), ("z", 0.08, 4.0), ("roll", 0.01, 2.0), ("pitch", 0.01, 2.0), ("yaw", 0.03, 4.0)],
+    [
+        ("z", 0.03, 1.5),
+        ("z", 0.05, 2.0),
+        ("z", 0.08, 4.0),
+        ("roll", 0.01, 2.0),
+        ("pitch", 0.01, 2.0),
+        ("yaw", 0.03, 4.0),
+    ],
 )
 def test_right_forces_of_a_slow_sine_along_another_axis_are_not_doubted(axis, amplitude, period):
     assert wrong_forces(sine(axis, amplitude, period), TABLE) == []

@@ -215,7 +215,12 @@ def of_logger(stamps: list[str], separator: str = ",", head: str = "Timestamp") 
 @pytest.mark.parametrize("head", ["Timestamp", "Date/Time", "Time", "Uhrzeit"])
 @pytest.mark.parametrize(
     ("form", "separator"),
-    [("%Y-%m-%d %H:%M:%S.%f", ","), ("%Y-%m-%dT%H:%M:%S.%f", "\t"), ("%d.%m.%Y %H:%M:%S,%f", ";"), ("%H:%M:%S.%f", ",")],
+    [
+        ("%Y-%m-%d %H:%M:%S.%f", ","),
+        ("%Y-%m-%dT%H:%M:%S.%f", "\t"),
+        ("%d.%m.%Y %H:%M:%S,%f", ";"),
+        ("%H:%M:%S.%f", ","),
+    ],
 )
 def test_clock_times_are_read_as_seconds_since_the_first(tmp_path, head, form, separator):
     """Also past midnight; to the microsecond that is written."""
@@ -254,8 +259,8 @@ def test_a_named_column_of_seconds_is_taken_before_clock_times(tmp_path):
     [
         ("12:00:00,1\n12:00:00,2\n", "line 3, column 'Stamp': .* coarser than the samples; .* file_rate"),
         ("12:00:00,1\nnoon,2\n", "line 3, column 'Stamp': 'noon' is no time"),
-        ("2026-01-01 12:00:00,1\n2026-01-02 12:00:01,2\n", "line 3, .* later day, without midnight between"),
-        ("2026-01-01 23:00:00,1\n2026-01-01 01:00:00,2\n", "line 3, .* is earlier than the line before; sort"),
+        ("2026-01-01 12:00:00,1\n2026-01-02 12:00:01,2\n", "line 3, .* another day, without midnight between"),
+        ("2026-01-01 23:00:00,1\n2026-01-01 01:00:00,2\n", "line 3, .* is earlier on the day of the line before; sort"),
     ],
 )
 def test_clock_times_that_are_no_time_axis_are_refused_with_line_and_column(tmp_path, text, phrase):
@@ -265,7 +270,7 @@ def test_clock_times_that_are_no_time_axis_are_refused_with_line_and_column(tmp_
 
 def test_a_column_that_is_no_number_is_named(tmp_path):
     text = "Date,Time,x [m],y [m]\n2026-01-01,12:00:00.0,1,2\n2026-01-01,12:00:00.5,1,2\n"
-    with pytest.raises(RecordError, match="line 2, column 1: '2026-01-01' is neither .* leave it out"):
+    with pytest.raises(RecordError, match=r"line 2, column 1: '2026-01-01' is neither .* leave it out"):
         load_raw(put(tmp_path, "run.csv", text))
 
 

@@ -69,7 +69,11 @@ def test_a_sensor_that_is_stuck_for_longer_than_the_unanswered_samples_is_found(
 # ------------------------------------------------------------------------------------------ up to a trip
 @pytest.mark.parametrize(
     ("trouble", "count"),  # of samples that are left
-    [("tripped at 1.465 s: by Anna", 3001), ("tripped before the recording began: by Anna", 2), ("tripped at 9 s", None)],
+    [
+        ("tripped at 1.465 s: by Anna", 3001),
+        ("tripped before the recording began: by Anna", 2),
+        ("tripped at 9 s", None),
+    ],
 )
 def test_a_recording_is_used_up_to_its_trip_once(trouble, count, caplog):
     """At 2048 Hz sample 3000 is at 1.46484 s, the last before the trip."""

@@ -19,8 +19,8 @@ from lhpost6_pin.identification.calibration.prepare import prepare_problem
 from lhpost6_pin.identification.calibration.start_states import no_start_states, start_states
 from lhpost6_pin.identification.decompose.record import decompose_record
 from lhpost6_pin.identification.friction_start import estimate_start, largest_share, start_wrenches
-from lhpost6_pin.identification.prepare import AS_RECORDED, prepare_test
 from lhpost6_pin.identification.inverse_dynamics import leg_wrenches
+from lhpost6_pin.identification.prepare import AS_RECORDED, prepare_test
 from lhpost6_pin.identification.residuals import evaluate_residuals, follow
 from lhpost6_pin.identification.validation import validate
 from lhpost6_pin.machine.machine import load_machine

@@ -78,9 +78,7 @@ class ForceBalance(NamedTuple):
 
     def of(self, group: ActuatorGroup) -> "ForceBalance":
         """The balance on the axes of a group, which judges its actuators."""
-        return self._replace(
-            gram=self.gram[group.axes], rubbed=self.rubbed[group.axes], judged=group.actuators
-        )
+        return self._replace(gram=self.gram[group.axes], rubbed=self.rubbed[group.axes], judged=group.actuators)
 
 
 class _Wrenches(NamedTuple):

@@ -30,7 +30,8 @@ _TRIP = re.compile(r"tripped (?:at (?P<time>[\d.]+) s|before the recording began
 def before_trip(record: xr.Dataset) -> xr.Dataset:
     """The record up to its trip, with its time and reason as attribute `cut`; as it is where there is none.
 
-    Of one that tripped before it began the first two samples are left, which are too short for all. The cut is logged as a warning with the test's name.
+    Of one that tripped before it began the first two samples are left, which are too short for all. The cut is logged
+    as a warning with the test's name.
     """
     trouble = str(record.attrs.get("trouble", "none"))
     trip = _TRIP.match(trouble)

@@ -73,10 +73,10 @@ def start_wrenches(
 def estimate_start(plant: Plant, test: MeasuredTest, cutoff: float) -> Array:
     """Friction's states (n_states,) at the start of a test, by the balance of forces up to `cutoff` [Hz].
 
-    In a measured test the most probable ones, with the prior of `start_deviation` and an error of the balance that is, on each axis, as
-    large as what remains of it, and as correlated from sample to sample (an autoregression of first order, after
-    Cochrane and Orcutt, 1949). Means over the test count for nothing: a force that stays may be the offset of a sensor.
-    In a simulated test those that balance its forces, if states of zero do not (`friction.held_gain` of
+    In a measured test the most probable ones, with the prior of `start_deviation` and an error of the balance that is,
+    on each axis, as large as what remains of it, and as correlated from sample to sample (an autoregression of first
+    order, after Cochrane and Orcutt, 1949). Means over the test count for nothing: a force that stays may be the offset
+    of a sensor. In a simulated test those that balance its forces, if zero does not (`friction.held_gain` of
     `decompose.toml`), else zero. Zero where forces are not measured.
     """
     out = np.zeros(len(plant.states))

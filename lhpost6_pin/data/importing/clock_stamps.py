@@ -62,12 +62,14 @@ def seconds_of_stamps(stamps: Lines, column: str, source: str) -> Array:
         stamp = _STAMP.fullmatch(text)
         if stamp is None:
             raise RecordError(f"{place}: {text[:40]!r} is no time as 12:00:00.25; correct it, or cut the table there")
-        hour = int(stamp["hour"]) % 12 + 12 * (stamp["half"].lower() == "pm") if stamp["half"] else int(stamp["hour"])
+        hour = int(stamp["hour"])
+        if stamp["half"]:
+            hour = hour % 12 + 12 * (stamp["half"].lower() == "pm")
         clock = 3600.0 * hour + 60.0 * int(stamp["minute"]) + float(stamp["second"].replace(",", "."))
         passed = clock < last - 0.5 * DAY
         if date is not None and (stamp["date"] != date) != passed:
-            what = "is earlier" if passed else "is of a later day, without midnight between,"
-            raise RecordError(f"{place}: {text!r} {what} than the line before; sort the rows, or cut the table there")
+            what = "is earlier on the day of" if passed else "is of another day, without midnight between, than"
+            raise RecordError(f"{place}: {text!r} {what} the line before; sort the rows, or cut the table there")
         if clock == last:
             raise RecordError(
                 f"{place}: {text!r} is the time of the line before, too: stamps are coarser than the samples; leave the "

@@ -69,7 +69,7 @@ def seconds_of_stamps(stamps: Lines, column: str, source: str) -> Array:
         passed = clock < last - 0.5 * DAY
         if date is not None and (stamp["date"] != date) != passed:
             what = "is earlier on the day of" if passed else "is of another day, without midnight between, than"
-            raise RecordError(f"{place}: {text!r} {what} the line before; sort the rows, or cut the table there")
+            raise RecordError(f"{place}: {text!r} {what} the line before; sort the rows, or cut them there")
         if clock == last:
             raise RecordError(
                 f"{place}: {text!r} is the time of the line before, too: stamps are coarser than the samples; leave the "

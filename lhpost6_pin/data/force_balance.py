@@ -140,12 +140,12 @@ def dynamic_balances(record: xr.Dataset, plant: Plant, force: Array, numbers: Pa
     except RecordError:
         return
     for band in bands:
-        share, friction = band.apply(moved.share, moved.dt), band.apply(moved.friction, moved.dt)
-        base, _ = np.linalg.qr(friction)
+        share = band.apply(moved.share, moved.dt)
+        base, _ = np.linalg.qr(band.apply(moved.friction, moved.dt))
         flat = share.reshape(len(share), -1)
         rubbed = (base @ (base.T @ flat)).reshape(share.shape)
-        grams = (np.einsum("tik,tjk->kij", x, x) / len(x) for x in (share - rubbed, rubbed))
-        yield ForceBalance("inertia", *grams, np.ones(plant.spools, bool))
+        left, friction = (np.einsum("tik,tjk->kij", x, x) / len(x) for x in (share - rubbed, rubbed))
+        yield ForceBalance("inertia", left, friction, np.ones(plant.spools, bool))
 
 
 def _missing(gram: Array, factor: Array) -> Array:

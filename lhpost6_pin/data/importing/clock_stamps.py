@@ -15,7 +15,7 @@ from ...core.number_table import Dialect
 
 __all__ = ["Lines", "is_stamp", "seconds_of_stamps", "take_stamps"]
 
-Lines = Sequence[tuple[int, str]]
+Lines = list[tuple[int, str]]
 """Lines of a table, each with its number in the file."""
 
 DAY = 86400.0  # [s]
@@ -72,8 +72,8 @@ def seconds_of_stamps(stamps: Lines, column: str, source: str) -> Array:
             raise RecordError(f"{place}: {text!r} {what} the line before; sort the rows, or cut them there")
         if clock == last:
             raise RecordError(
-                f"{place}: {text!r} is the time of the line before, too: stamps are coarser than the samples; leave the "
-                "column out, and give file_rate, in Hz, in [test] of the map"
+                f"{place}: {text!r} is the time of the line before, too: stamps are coarser than the samples; leave "
+                "the column out, and give file_rate, in Hz, in [test] of the map"
             )
         days += passed
         last, date, digits = clock, stamp["date"], max(digits, len(stamp["digits"] or ""))

@@ -27,9 +27,10 @@ APART = 0.5
 ROUNDS = 3
 """Estimates: size and correlation of the error that weighs one are of what the one before leaves."""
 
-MOST_ROUNDS, STEP, SETTLED = 20, 1e-3, 1e-6
-"""Of a record without noise: Gauss-Newton steps at most, the difference by which states are varied in them, and the
-largest change of a state at which they end: the law of Bouc and Wen is strongly curved near full friction."""
+MOST_ROUNDS, PATIENCE, STEP, SETTLED = 20, 4, 1e-3, 1e-6
+"""Of a record without noise: Gauss-Newton steps at most, as the law of Bouc and Wen is strongly curved near full
+friction; after how many the squares must have halved; the difference by which states are varied in them; and the
+largest change of a state at which they end."""
 
 BALANCED, SHOWN = 1e-4, 1e-2
 """Residual over measured wrench of an axis up to which a record without noise is in balance as it is; and variation of
@@ -124,22 +125,23 @@ def _without_noise(plant: Plant, test: MeasuredTest, path: Path) -> Array:
     least = before = float(np.sum((residual / size) ** 2))
     if before <= BALANCED**2 * residual.size:
         return zero
-    best, apart = zero, APART
-    for _ in range(MOST_ROUNDS):
+    best, apart, prior = zero, APART, 1.0 / start_deviation() ** 2
+    for rounds in range(MOST_ROUNDS):
+        if rounds == PATIENCE and least > 0.5 * before:
+            break
         slopes, places = start_wrenches(plant, test, path, about=state, apart=apart)
         error = np.sqrt(np.mean(residual**2, axis=0)) + BALANCED * size
         rows = (slopes[:, plant.axes] / error[:, None]).reshape(-1, len(places))
-        prior = np.eye(len(places)) / start_deviation() ** 2
-        pull = rows.T @ (residual / error).ravel() - prior @ state[places]
+        pull = rows.T @ (residual / error).ravel() - prior * state[places]
         changed = state.copy()
-        changed[places] += np.linalg.solve(rows.T @ rows + prior, pull)
-        step, state, apart = state, _limited(plant, changed), STEP
+        changed[places] += np.linalg.solve(rows.T @ rows + prior * np.eye(len(places)), pull)
+        last, state, apart = state, _limited(plant, changed), STEP
         began = follow(plant, test, (plant, path), start=state)
         residual = evaluate_residuals(plant, test, ("wrench",), path=began).wrench[:, plant.axes]
         left = float(np.sum((residual / size) ** 2))
         if left < least:
             least, best = left, state
-        if np.abs(state - step).max() < SETTLED:
+        if np.abs(state - last).max() < SETTLED:
             break
     return best if least * _number("friction.held_gain") <= before else zero
 

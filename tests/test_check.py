@@ -117,6 +117,20 @@ def test_a_spike_a_dropout_and_a_channel_that_never_changes_are_found(tests, cha
     assert faults(check_dataset(change(record, channel, start=start, values=values))) == [("warning", channel, start)]
 
 
+@pytest.mark.parametrize(
+    ("kind", "share", "found"), [("simulated", 5e-4, 0), ("simulated", 5e-3, 1), ("measured", 5e-4, 1)]
+)
+def test_a_spike_of_a_record_without_noise_has_a_least_size(kind, share, found):
+    """Where friction changes, a model's acceleration has kinks that no other sample shows: 1e-4 of the span."""
+    t = np.arange(4096) / 2048
+    x = np.zeros((len(t), 6))
+    x[:, 4] = 0.05 * np.sin(2 * np.pi * 1.5 * t) * np.sin(np.pi * t / t[-1]) ** 2
+    x[1234, 4] += share * np.ptp(x[:, 4])
+    record = make_record(t, {"platen_acceleration": x}, MACHINE.labels, {"kind": kind, "test": "kink"})
+    spikes = [f for f in check_dataset(record, MACHINE) if f.remedy == "interpolate it"]
+    assert [(f.channel, f.sample) for f in spikes] == found * [("platen_acceleration[pitch]", 1234)]
+
+
 def test_a_step_of_the_spool_and_a_kink_of_the_pressure_are_no_spikes():
     t = np.arange(4096) / 2048
     spool = np.where(t < 1, 0.3, -0.1) * np.sin(2 * np.pi * 3 * t + 0.5) + 0.01 * np.sin(170 * t)

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from lhpost6_pin.control import load_controller
+from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.core.units import parse_unit, units_of
 from lhpost6_pin.data.check import check_dataset
 from lhpost6_pin.data.force_balance import actuator_groups, dynamic_balances
@@ -18,6 +20,8 @@ from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.actuator_forces import force_range, rest_forces
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import kinematic_jacobian
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.simulation.rehearse import rehearse
 
 TABLE, GUIDED = load_machine(), load_machine("uniaxial")
 KIP = 1.0 / 4448.2216  # of forces in kip taken for N
@@ -240,6 +244,46 @@ def test_actuators_that_act_on_axes_of_their_own_are_judged_apart():
     for name, sizes in (("lhpost6", [4, 6]), ("hexapod", [6]), ("biaxial", [1, 1]), ("uniaxial", [1])):
         groups = actuator_groups(make_plant(load_machine(name)))
         assert [int(g.actuators.sum()) for g in groups] == sizes, name
+
+
+def sine(axis: str, amplitude: float, period: float) -> xr.Dataset:
+    """A simulated sine in closed loop, one model step a sample, recorded at 256 Hz."""
+    motion = find_motion("sine", axis=axis, amplitude=amplitude, period=period, cycles=4.0)
+    options = {"engine": "fused", "steps_per_second": SAMPLE_RATE, "record_every": 8}
+    target = make_target(motion, rate=float(SAMPLE_RATE))
+    return rehearse(TABLE, target, load_controller("lhpost6"), attrs={"test": "sine"}, **options).record
+
+
+@pytest.mark.parametrize("period", [1.0, 1.5, 2.0, 2.2, 2.5, 3.0, 4.0])
+@pytest.mark.parametrize(("axis", "amplitude"), [("x", 0.05), ("x", 0.1), ("x", 0.15), ("y", 0.05), ("y", 0.1)])
+def test_right_forces_of_a_slow_sine_are_not_doubted(axis, amplitude, period):
+    """Near 0.5 Hz inertia and struts almost cancel, and friction is most of the forces in the band of the balance."""
+    assert wrong_forces(sine(axis, amplitude, period), TABLE) == []
+
+
+@pytest.mark.parametrize(
+    ("axis", "amplitude", "period"),
+    [
+        ("z", 0.03, 1.5),
+        ("z", 0.05, 2.0),
+        ("z", 0.08, 4.0),
+        ("roll", 0.01, 2.0),
+        ("pitch", 0.01, 2.0),
+        ("yaw", 0.03, 4.0),
+    ],
+)
+def test_right_forces_of_a_slow_sine_along_another_axis_are_not_doubted(axis, amplitude, period):
+    assert wrong_forces(sine(axis, amplitude, period), TABLE) == []
+
+
+@pytest.mark.parametrize(("axis", "amplitude", "period"), [("x", 0.1, 1.0), ("x", 0.02, 0.25), ("y", 0.02, 0.25)])
+@pytest.mark.parametrize(("true", "read"), [("kip", "N"), ("kN", "N"), ("lbf", "N"), ("N", "lbf")])
+def test_another_unit_of_horizontal_forces_is_found_in_a_fast_sine(axis, amplitude, period, true, read):
+    """Of the kind that moves: inertia is well above friction."""
+    record = sine(axis, amplitude, period)
+    factor = parse_unit(read).factor / parse_unit(true).factor
+    (one,) = wrong_forces(scaled(record, factor, KINDS[0]), TABLE)
+    assert one.channel == named(KINDS[0]) and f"{true} taken for {read}" in one.message
 
 
 def test_import_and_check_say_it(lhpost6, tmp_path):

@@ -199,6 +199,81 @@ def test_a_bad_table_is_refused_with_line_and_column(tmp_path, text, phrase):
         load_raw(put(tmp_path, "run.csv", text))
 
 
+# --------------------------------------------------------------------------------------------- clock times
+def stamped(rate: float, digits: int, start: str, count: int = 400, form: str = "%Y-%m-%d %H:%M:%S.%f") -> list[str]:
+    """Times as a logger writes them, to `digits` of six."""
+    exact = np.datetime64(start, "ns") + np.rint(np.arange(count) / rate * 1e9).astype("timedelta64[ns]")
+    shown = (exact + np.timedelta64(5 * 10 ** (8 - digits), "ns")).astype("datetime64[us]").tolist()
+    return [t.strftime(form)[: len(t.strftime(form)) - 6 + digits] for t in shown]
+
+
+def of_logger(stamps: list[str], separator: str = ",", head: str = "Timestamp") -> str:
+    rows = [separator.join([t, repr(x)]) for t, x in zip(stamps, VALUES[:, 0].tolist(), strict=True)]
+    return "\n".join([separator.join([head, "x [m]"]), *rows, ""])
+
+
+@pytest.mark.parametrize("head", ["Timestamp", "Date/Time", "Time", "Uhrzeit"])
+@pytest.mark.parametrize(
+    ("form", "separator"),
+    [
+        ("%Y-%m-%d %H:%M:%S.%f", ","),
+        ("%Y-%m-%dT%H:%M:%S.%f", "\t"),
+        ("%d.%m.%Y %H:%M:%S,%f", ";"),
+        ("%H:%M:%S.%f", ","),
+    ],
+)
+def test_clock_times_are_read_as_seconds_since_the_first(tmp_path, head, form, separator):
+    """Also past midnight; to the microsecond that is written."""
+    for start in ("2026-01-01T12:00:00", "2026-12-31T23:59:59.500000"):
+        found = one(put(tmp_path, "run.csv", of_logger(stamped(RATE, 6, start, form=form), separator, head)))
+        assert found.names == ("x [m]",)
+        np.testing.assert_allclose(found.time, TIME, rtol=0, atol=1.01e-6)
+        np.testing.assert_array_equal(found.values[:, 0], VALUES[:, 0])
+
+
+def test_clock_times_to_the_millisecond_stand_for_uniform_times(tmp_path):
+    found = one(put(tmp_path, "run.csv", of_logger(stamped(RATE, 3, "2026-01-01T23:59:59"))))
+    record = make_imported_record([replace_units(found)], supply(), LABELS)
+    # the fit averages 400 rounding errors of at most half a millisecond, and of the first stamp
+    np.testing.assert_allclose(np.diff(record["time"]), 1.0 / RATE, rtol=1e-4)
+
+
+def replace_units(found: RawTest) -> RawTest:
+    """The column as one of `supply`."""
+    return raw(found.values, ["Pa"], found.time)
+
+
+def test_hours_of_half_a_day_are_those_of_noon(tmp_path):
+    stamps = ["1/2/2026 11:59:59.5 AM", "1/2/2026 12:00:00.0 PM", "1/2/2026 12:00:00.5 PM"]
+    found = one(put(tmp_path, "run.csv", "When,x [m]\n" + "".join(f"{t},{k}\n" for k, t in enumerate(stamps))))
+    np.testing.assert_array_equal(found.time, [0.0, 0.5, 1.0])
+
+
+def test_a_named_column_of_seconds_is_taken_before_clock_times(tmp_path):
+    text = "Stamp,time [s],x [m]\n12:00:00.0,0,1\n12:00:00.5,0.5,2\n"
+    np.testing.assert_array_equal(one(put(tmp_path, "run.csv", text)).time, [0.0, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("text", "phrase"),
+    [
+        ("12:00:00,1\n12:00:00,2\n", "line 3, column 'Stamp': .* coarser than the samples; .* file_rate"),
+        ("12:00:00,1\nnoon,2\n", "line 3, column 'Stamp': 'noon' is no time"),
+        ("2026-01-01 12:00:00,1\n2026-01-02 12:00:01,2\n", "line 3, .* another day, without midnight between"),
+        ("2026-01-01 23:00:00,1\n2026-01-01 01:00:00,2\n", "line 3, .* is earlier on the day of the line before; sort"),
+    ],
+)
+def test_clock_times_that_are_no_time_axis_are_refused_with_line_and_column(tmp_path, text, phrase):
+    with pytest.raises(RecordError, match=phrase):
+        load_raw(put(tmp_path, "run.csv", "Stamp,x [m]\n" + text))
+
+
+def test_a_column_that_is_no_number_is_named(tmp_path):
+    text = "Date,Time,x [m],y [m]\n2026-01-01,12:00:00.0,1,2\n2026-01-01,12:00:00.5,1,2\n"
+    with pytest.raises(RecordError, match=r"line 2, column 1: '2026-01-01' is neither .* leave it out"):
+        load_raw(put(tmp_path, "run.csv", text))
+
+
 @pytest.mark.parametrize(
     "text",
     [

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from lhpost6_pin.data.campaign import Campaign
 from lhpost6_pin.data.check import check_dataset
 from lhpost6_pin.data.records import make_record
-from lhpost6_pin.data.served_samples import SAFE_HOLD
+from lhpost6_pin.data.served_samples import SAFE_HOLD, before_trip, trip_note
+from lhpost6_pin.identification.calibration import usable_tests
 from lhpost6_pin.interfaces.link import PlantState
 from lhpost6_pin.machine.machine import load_machine
 
@@ -62,3 +64,31 @@ def test_a_sensor_that_is_stuck_for_longer_than_the_unanswered_samples_is_found(
     force[1490:1530] = force[1490]
     found = warned(record.assign(actuator_force=record["actuator_force"].copy(data=force)))
     assert len(found) == 2 and "is stuck at" in found[1] and "for 40 samples" in found[1]
+
+
+# ------------------------------------------------------------------------------------------ up to a trip
+@pytest.mark.parametrize(
+    ("trouble", "count"),  # of samples that are left
+    [
+        ("tripped at 1.465 s: by Anna", 3001),
+        ("tripped before the recording began: by Anna", 2),
+        ("tripped at 9 s", None),
+    ],
+)
+def test_a_recording_is_used_up_to_its_trip_once(trouble, count, caplog):
+    """At 2048 Hz sample 3000 is at 1.46484 s, the last before the trip."""
+    record = recorded(trouble=trouble)
+    record.encoding["source"] = "panel.nc"
+    part = before_trip(record)
+    assert part.sizes["time"] == (2 * RATE if count is None else count) and part.encoding["source"] == "panel.nc"
+    assert bool(trip_note(part)) == (count is not None) == ("test panel tripped" in caplog.text)
+    assert before_trip(part).identical(part)
+    assert not trip_note(record.assign_attrs(cut="ends in motion")) and before_trip(recorded()).identical(recorded())
+
+
+def test_a_test_that_tripped_is_calibrated_up_to_its_trip_or_skipped(caplog):
+    early, late = (recorded(trouble=f"tripped at {t} s: by Anna", test=n) for t, n in ((0.01, "early"), (1.8, "late")))
+    campaign = usable_tests(Campaign("c", (early, late)))
+    (kept,) = campaign.records
+    assert kept.attrs["test"] == "late" and kept.sizes["time"] < 2 * RATE
+    assert [one.test for one in campaign.skipped] == ["early"]

@@ -6,7 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lhpost6_pin.core.names import AXES
+from lhpost6_pin.control import load_controller
+from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.core.names import AXES, SAMPLE_RATE
+from lhpost6_pin.data.campaign import Campaign
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.effects.registry import law_of, states_of
@@ -14,11 +17,18 @@ from lhpost6_pin.identification.calibration import calibration_numbers
 from lhpost6_pin.identification.calibration.operating_point import OperatingPoint
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
 from lhpost6_pin.identification.calibration.start_states import no_start_states, start_states
-from lhpost6_pin.identification.friction_start import estimate_start, start_wrenches
+from lhpost6_pin.identification.decompose.record import decompose_record
+from lhpost6_pin.identification.friction_start import estimate_start, largest_share, start_wrenches
 from lhpost6_pin.identification.inverse_dynamics import leg_wrenches
+from lhpost6_pin.identification.prepare import AS_RECORDED, prepare_test
 from lhpost6_pin.identification.residuals import evaluate_residuals, follow
+from lhpost6_pin.identification.validation import validate
 from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import plant_motion
+from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.show.report.decompose_report import EXACT
+from lhpost6_pin.simulation.rehearse import rehearse
 
 RECORDS = Path(__file__).parent / "data" / "records"
 
@@ -137,3 +147,96 @@ def test_a_test_that_began_at_rest_is_left_as_it_is(base):
     for axis in set(plant.axes) - {AXES.index("pitch")}:  # where vertical seals, too, follow the noise of the path
         assert (after - rest)[:, axis].std() < 0.5 * rest[:, axis].std()
     assert np.all(after.std(axis=0) < 1.02 * rest.std(axis=0))
+
+
+# ---------------------------------------------------------------------------------------------- records without noise
+@pytest.fixture(scope="module")
+def run():
+    """A simulated sine along X, in closed loop from rest."""
+    target = make_target(find_motion("sine", amplitude=0.03, period=1.0, cycles=2.0), rate=float(SAMPLE_RATE))
+    test = {"test": "sine"}
+    return rehearse(load_machine(), target, load_controller("lhpost6"), attrs=test, engine="fused").record
+
+
+AMID = 7 * SAMPLE_RATE  # sample of the run, in its motion
+
+
+def second(record, begin=AMID):
+    """What a recording that began in the motion holds: no hidden states."""
+    late = record.isel(time=slice(begin, None))
+    late = late.assign_coords(time=late["time"] - late["time"][0])
+    return late.drop_vars([name for name in late if name.startswith("hidden_")])
+
+
+def friction_of(record, plant, sample):
+    """Hidden states (n_states,) of a run at a sample."""
+    own = np.concatenate([record[f"hidden_{kind}"].values[sample] for kind in ("seal_friction", "pad_friction")])
+    return np.concatenate([np.zeros(len(plant.states) - len(own)), own])
+
+
+@pytest.mark.parametrize("begin", [AMID, AMID + 700])
+def test_a_recording_that_began_after_a_motion_is_as_exact_as_the_run_from_rest(run, begin):
+    """Friction holds most of its force there; the residual is that of the run itself, with its own states."""
+    plant = make_plant(load_machine())
+    test = prepare_test(plant, second(run, begin), None, AS_RECORDED)
+    due = friction_of(run, plant, begin)
+    assert largest_share(plant, due) > 0.3
+    zero, true, found = (
+        evaluate_residuals(plant, test, ("wrench",), path=follow(plant, test, start=start)).wrench
+        for start in (None, due, estimate_start(plant, test, 30.0))
+    )
+    size = np.abs(zero).max(axis=0)
+    # steps end where they hardly change states: within two thousandths of what zero leaves, on every axis
+    assert np.all(np.abs(found).max(axis=0) < np.abs(true).max(axis=0) + 2e-3 * size.max())
+
+
+def test_a_run_from_rest_is_begun_from_zero(run):
+    """To the last bit, as its residual is that of rounding."""
+    plant = make_plant(load_machine())
+    test = prepare_test(plant, second(run, 0), None, AS_RECORDED)
+    assert not estimate_start(plant, test, 30.0).any()
+
+
+def test_what_a_model_lacks_along_the_whole_test_is_not_explained_by_its_start(run):
+    """A platen that is a tenth heavier, in a run from rest."""
+    heavier = make_plant(load_machine(override={"platen.mass": [1.1 * m for m in load_machine().platen.mass]}))
+    test = prepare_test(heavier, second(run, 0), None, AS_RECORDED)
+    assert not estimate_start(heavier, test, 30.0).any()
+
+
+def test_decompose_finds_a_recording_after_a_motion_exact_and_states_what_friction_holds(run):
+    found = decompose_record(load_machine(), second(run))
+    assert any(note.startswith("Seals or pads hold up to") for note in found.notes)
+    worst = np.abs(found.forces.residual).max(axis=0) / np.abs(found.forces.measured).max(axis=0)
+    assert worst[0] < EXACT and worst[4] < EXACT
+
+
+# ---------------------------------------------------------------------------------------------- up to a trip
+def tripped(run):
+    """The run as a recording that tripped in its motion, after which forces are not of its motion."""
+    force = run["actuator_force"].values.copy()
+    force[9 * SAMPLE_RATE :] += 1e5
+    return run.assign(actuator_force=run["actuator_force"].copy(data=force)).assign_attrs(
+        trouble="tripped at 9.000 s: z displacement beyond its interlock"
+    )
+
+
+def test_decompose_uses_a_recording_up_to_its_trip_and_states_it(run):
+    found = decompose_record(load_machine(), tripped(run))
+    assert found.notes[0].startswith("tripped at 9.000 s: z displacement")
+    assert found.record.sizes["time"] == 9 * SAMPLE_RATE
+    worst = np.abs(found.forces.residual).max(axis=0) / np.abs(found.forces.measured).max(axis=0)
+    assert np.all(worst[[0, 2, 4]] < EXACT)  # of the axes that bear a force
+
+
+def test_decompose_refuses_a_recording_that_tripped_before_it_began(run):
+    with pytest.raises(RecordError, match=r"s are too short"):
+        decompose_record(load_machine(), run.assign_attrs(trouble="tripped before the recording began: by Anna"))
+
+
+def test_validate_uses_a_recording_up_to_its_trip_and_states_it(run, caplog):
+    found = validate(load_machine(), Campaign("c", (tripped(run),)), phases=(1,), jobs=1)
+    assert "test sine tripped at 9.000 s" in caplog.text
+    (phase,) = found.phases
+    assert phase.notes[0].startswith("tripped at 9.000 s") and len(phase.time) == 9 * SAMPLE_RATE
+    assert max(a.rrmse_aligned for a in phase.of("wrench") if a.moves) < EXACT

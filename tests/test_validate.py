@@ -27,8 +27,10 @@ from lhpost6_pin.identification.validation.spectra import find_peak, find_valves
 from lhpost6_pin.mechanics.linearize import oil_column_modes
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.motions import find_motion, make_target
+from lhpost6_pin.show.report.page import Table
 from lhpost6_pin.show.report.scales import percent
 from lhpost6_pin.show.report.validate_report import validation_verdict, write_validate_report
+from lhpost6_pin.show.report.validate_sections import _residual_blocks
 from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.simulation.simulated_campaign import SensorErrors, as_sensed
 from lhpost6_pin.tuning.identify import noise_target
@@ -457,3 +459,15 @@ def test_a_reason_that_tests_share_is_the_same_for_all(monkeypatch):
         test = SimpleNamespace(test=SimpleNamespace(record=record, name=name), time=np.zeros(2))
         reasons.add(run_phase(2, test).reason)
     assert reasons == {"has no spool_position"}
+
+
+def test_only_residuals_above_their_noise_are_marked(found):
+    """A record without noise has residuals far below the noise that a sensors file states: nothing is wrong with it."""
+    ratio = {"x": 3e-4, "y": 1.0, "z": 2.5}
+    phase = next(p for p in found.phases if p.number == 1)
+    rows = tuple(a._replace(noise=1.0, error_aligned=ratio.get(a.column, 1.9)) for a in phase.of("wrench"))
+    tables = [
+        b for b in _residual_blocks(replace(found, phases=(replace(phase, agreement=rows),))) if isinstance(b, Table)
+    ]
+    cells = next(t for t in tables if "over the noise" in t.caption).rows[0]
+    assert [str(cell).startswith("! ") for cell in cells[1:]] == [False, False, True, False, False, False]

@@ -40,6 +40,7 @@ START = 2e-3  # of the largest span in the same unit: how far the first sample m
 START_NOISE = 8.0  # and how many standard deviations of the noise
 STILL = 2e-5  # of that span: a channel that moved by more each sample does not stop at once by itself
 SPIKE_NOISE = 20.0  # standard deviations of the roughness: below this a spike and a kink look alike
+SPIKE_EXACT = 1e-3  # of that span, in a record without noise: kinks of friction look like spikes of 1e-4
 RESOLUTION_STEPS = 8  # as many of a channel's smallest steps count as movement
 UNRELATED, FOLLOWS = 0.5, 0.95  # correlations of force and pressures: below, noise or another actuator's; the same
 MOVES = 0.5  # share of the largest variation of its kind from which a force must follow its pressures
@@ -236,7 +237,8 @@ def _spike(c: _Column) -> _Warning | None:
     rough = np.convolve(np.pad(c.x, 3, "reflect", reflect_type="odd"), taps, mode="valid")
     size = np.abs(rough)
     beside = maximum_filter1d(np.stack([np.roll(size, s) for s in (-10, 10)]), 13, axis=1).max(axis=0)
-    least = max(SPIKE_NOISE * 1.4826 * np.median(size), RESOLUTION_STEPS * resolution(c.x), STILL * c.span)
+    floor = STILL if c.measured else SPIKE_EXACT
+    least = max(SPIKE_NOISE * 1.4826 * np.median(size), RESOLUTION_STEPS * resolution(c.x), floor * c.span)
     for k in np.flatnonzero(((size > 4 * beside) & (size > least))[3:-3]) + 3:
         if not c.judged[k - 3 : k + 4].all():
             continue

@@ -54,6 +54,7 @@ class ForceBalance(NamedTuple):
 
     by: str  # what requires the forces
     gram: Array  # (k, n + 1, n + 1) [N2] mean products of the actuators' shares, and last of what is required
+    rubbed: Array  # as gram, of the part that is projected out as friction
     judged: Mask  # (n,) actuators that it can judge
 
     @property
@@ -63,8 +64,11 @@ class ForceBalance(NamedTuple):
 
     def remainder(self, factor: Array) -> Array:
         """Mean squares [N2] of required less measured forces times `factor` (..., n)."""
-        both = np.concatenate([factor, np.full((*factor.shape[:-1], 1), -1.0)], axis=-1)
-        return np.maximum(np.einsum("...i,kij,...j->...", both, self.gram, both, optimize=True), 0.0)
+        return _missing(self.gram, factor)
+
+    def friction(self, factor: Array) -> Array:
+        """Mean squares [N2] of the friction that measured forces times `factor` (..., n) must hold to be right."""
+        return _missing(self.rubbed, factor)
 
     def regression(self, factor: Array) -> tuple[float, float]:
         """Ratio of measured forces times `factor` (n,) to the required ones, and the share of these explained."""
@@ -74,7 +78,7 @@ class ForceBalance(NamedTuple):
 
     def of(self, group: ActuatorGroup) -> "ForceBalance":
         """The balance on the axes of a group, which judges its actuators."""
-        return self._replace(gram=self.gram[group.axes], judged=group.actuators)
+        return self._replace(gram=self.gram[group.axes], rubbed=self.rubbed[group.axes], judged=group.actuators)
 
 
 class _Wrenches(NamedTuple):
@@ -113,7 +117,8 @@ def static_balance(plant: Plant, force: Array, group: ActuatorGroup) -> ForceBal
     axes = group.axes & np.isin(plant.axes, (VERTICAL, *TILTS))
     at_rest = share[0][:, axes]  # (n_actuators + 1, k)
     at_rest[:-1][~group.actuators] = 0.0
-    return ForceBalance("weight", np.einsum("ik,jk->kij", at_rest, at_rest), group.actuators)
+    gram = np.einsum("ik,jk->kij", at_rest, at_rest)
+    return ForceBalance("weight", gram, np.zeros_like(gram), group.actuators)
 
 
 def dynamic_balances(record: xr.Dataset, plant: Plant, force: Array, numbers: Parameters) -> Iterator[ForceBalance]:
@@ -135,12 +140,18 @@ def dynamic_balances(record: xr.Dataset, plant: Plant, force: Array, numbers: Pa
     except RecordError:
         return
     for band in bands:
-        share, friction = band.apply(moved.share, moved.dt), band.apply(moved.friction, moved.dt)
-        base, _ = np.linalg.qr(friction)
+        share = band.apply(moved.share, moved.dt)
+        base, _ = np.linalg.qr(band.apply(moved.friction, moved.dt))
         flat = share.reshape(len(share), -1)
-        share = (flat - base @ (base.T @ flat)).reshape(share.shape)
-        gram = np.einsum("tik,tjk->kij", share, share) / len(share)
-        yield ForceBalance("inertia", gram, np.ones(plant.spools, bool))
+        rubbed = (base @ (base.T @ flat)).reshape(share.shape)
+        left, friction = (np.einsum("tik,tjk->kij", x, x) / len(x) for x in (share - rubbed, rubbed))
+        yield ForceBalance("inertia", left, friction, np.ones(plant.spools, bool))
+
+
+def _missing(gram: Array, factor: Array) -> Array:
+    """Mean squares [N2] of required less measured forces times `factor` (..., n), of a Gram matrix per axis."""
+    both = np.concatenate([factor, np.full((*factor.shape[:-1], 1), -1.0)], axis=-1)
+    return np.maximum(np.einsum("...i,kij,...j->...", both, gram, both, optimize=True), 0.0)
 
 
 def _rest() -> PlatenMotion:

@@ -193,10 +193,18 @@ class _Search:
         return balance.regression(self.factor * balance.judged)
 
     def _unexplained(self, balance: ForceBalance) -> Iterator[_Wrong]:
-        """A size far from what is required, of all forces that are not settled, where no hypothesis holds."""
+        """A size far from what is required, of all forces that are not settled, where no hypothesis holds.
+
+        Not where the forces, brought to the size required, would hold much friction: what the projection leaves of it
+        is not small beside inertia then.
+        """
         ratio, explained = self._regression(balance)
         limit, near = self.numbers.number("force_unit.factor"), self.numbers.number("balance.near")
-        doubted = explained >= self.numbers.number("force_unit.explained") or balance.by == "weight"
+        rubbed = balance.friction(self.factor * balance.judged / (ratio or 1.0)) / max(balance.required, 1e-300)
+        doubted = balance.by == "weight" or (
+            explained >= self.numbers.number("force_unit.explained")
+            and rubbed <= self.numbers.number("force_unit.friction")
+        )
         if doubted and (abs(ratio) < 1.0 / limit or (ratio > limit and not self.loaded)):
             units = [k for k in self._factors() if k > 0.0 and 1.0 / near <= ratio * k <= near]
             those = tuple(self.names[balance.judged & ~self.settled])

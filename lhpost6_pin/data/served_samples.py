@@ -1,9 +1,11 @@
 """Samples of a recording of a served plant that show no sensor: unanswered ones, and those of its safe hold.
 
 A sample that the controller did not answer repeats the row before it, in all channels. In its safe hold, as after a
-trip, the plant moves its valves by itself, to where they stay.
+trip, the plant moves its valves by itself, to where they stay: what follows a trip is not the test's.
 """
 
+import logging
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,12 +13,45 @@ import xarray as xr
 
 from ..core.arrays import Mask
 
-__all__ = ["ANSWERED", "PLANT_STATE", "SAFE_HOLD", "judged_samples", "served_findings"]
+__all__ = ["ANSWERED", "PLANT_STATE", "SAFE_HOLD", "before_trip", "judged_samples", "served_findings", "trip_note"]
+
+log = logging.getLogger(__name__)
 
 ANSWERED, PLANT_STATE = "answered", "plant_state"
 """Channels of such a recording: whether the controller answered a sample, and the state of the plant."""
 
 SAFE_HOLD = 2  # state, as `interfaces.link.PlantState`
+
+
+_TRIP = re.compile(r"tripped (?:at (?P<time>[\d.]+) s|before the recording began)")
+"""Beginning of the attribute `trouble` of a recording that tripped; its time is that of the record."""
+
+
+def before_trip(record: xr.Dataset) -> xr.Dataset:
+    """The record up to its trip, with its time and reason as attribute `cut`; as it is where there is none.
+
+    Of one that tripped before it began the first two samples are left, which are too short for all. The cut is logged
+    as a warning with the test's name.
+    """
+    trouble = str(record.attrs.get("trouble", "none"))
+    trip = _TRIP.match(trouble)
+    if trip is None or "time" not in record:
+        return record
+    time = record["time"].values
+    count = max(2, int(np.searchsorted(time - time[:1], float(trip["time"] or 0.0))))  # a record has two at least
+    if count >= len(time):
+        return record
+    cut = f"{trouble}; what follows, {len(time) - count} of {len(time)} samples, is left out"
+    log.warning("test %s %s", record.attrs.get("test", "test"), cut)
+    part = record.isel(time=slice(0, count)).assign_attrs(cut=cut)
+    part.encoding = dict(record.encoding)  # with the file's name
+    return part
+
+
+def trip_note(record: xr.Dataset) -> tuple[str, ...]:
+    """When and why a record was cut by `before_trip`, as a note; none where it was not."""
+    cut = str(record.attrs.get("cut", ""))
+    return (cut,) if _TRIP.match(cut) else ()
 
 
 def judged_samples(dataset: xr.Dataset) -> Mask:

@@ -15,36 +15,43 @@ from ..data.records import is_measured
 from ..effects.registry import law_of, states_of
 from ..machine.parameters import load_parameters
 from ..mechanics.plant import Plant
-from .inverse_dynamics import with_loads
+from ..mechanics.pose import plant_motion
+from .inverse_dynamics import leg_wrenches, with_loads
 from .prepare import MeasuredTest, actuator_forces
 from .residual_kernels import row_wrenches
 from .residuals import Path, evaluate_residuals, follow
 
 __all__ = ["estimate_start", "largest_share", "start_deviation", "start_wrenches", "with_start"]
 
-APART = 0.5
-"""State, of full friction, above and below a state between which its change of the wrench is taken."""
+APART, NEAR = 0.5, 1e-3
+"""Change of a state, of full friction, either way, by which that of the wrench is taken; and so without noise, where
+friction near its full force, strongly curved there, has to be exact."""
 
-ROUNDS = 4
+ROUNDS, MOST_ROUNDS, SETTLED = 4, 20, 1e-6
 """Linearisations: on a triangle whose seals and pads held all of their friction, what the third one left of its wrench
-was that of the true states within a tenth."""
+was that of the true states within a tenth. Without noise, at most, and change of the states at which they end."""
 
 WEIGHINGS = 2
 """Estimates in each: size and correlation of the error that weighs one are of what the one before leaves."""
 
+BALANCED, SHOWN = 1e-4, 1e-2
+"""Residual over measured wrench of an axis up to which a record without noise is in balance as it is; and variation of
+an axis over that of the largest, forces and moments alike, below which its residual counts as of one so large."""
+
 
 def start_deviation() -> float:
     """Prior standard deviation of a state at the start, of full friction (`models/procedures/decompose.toml`)."""
-    return load_parameters(models_folder() / "procedures" / "decompose.toml").number("friction.held")
+    return _number("friction.held")
 
 
 def start_wrenches(
-    plant: Plant, test: MeasuredTest, path: Path | None = None, about: Array | None = None
+    plant: Plant, test: MeasuredTest, path: Path | None = None, *, about: Array | None = None, apart: float = APART
 ) -> tuple[Array, NDArray[np.intp]]:
     """Wrenches (n, 6, k) on the platen at C in {c} [N, N m] by a unit of each of k states at the start; their places.
 
-    Of states near those of `about` (n_states,), by default the test's own, and up to full friction. path is that of
-    `follow`, if it is known. There are none (k = 0) where forces are not measured, as there is no balance of them.
+    Differences between states `apart` above and below `about` (n_states,), by default the test's own, and within full
+    friction. path is that of `follow`, if it is known. There are none (k = 0) where forces are not measured, as there
+    is no balance of them.
     """
     force, rows = actuator_forces(plant.machine, test.channels), _friction_rows(plant)
     if force is None or not len(rows):
@@ -57,7 +64,7 @@ def start_wrenches(
         some = rows[[size > nth for size in sizes]]
         own = [states_of(row).start + nth for row in some]
         sides, states = [], []
-        for step in (APART, -APART):
+        for step in (apart, -apart):
             state = middle.copy()
             state[own] = np.clip(state[own] + step, -1.0, 1.0)
             began = follow(plant, test, known, start=state)
@@ -70,34 +77,81 @@ def start_wrenches(
 
 
 def estimate_start(plant: Plant, test: MeasuredTest, cutoff: float) -> Array:
-    """Friction's states (n_states,) at the start of a measured test, by the balance of forces up to `cutoff` [Hz].
+    """Friction's states (n_states,) at the start of a test, by the balance of forces up to `cutoff` [Hz].
 
     The most probable ones, at most full friction, with the prior of `start_deviation` and an error of the balance that
     is, on each axis, as large as what remains of it, and as correlated from sample to sample (an autoregression of
-    first order, after Cochrane and Orcutt, 1949): the balance is linearised anew about each estimate. Zero in a
-    simulated test, and where forces are not measured. Means over the test count for nothing: a force that stays may be
-    the offset of a sensor.
+    first order, after Cochrane and Orcutt, 1949): the balance is linearised anew about each estimate. Means over the
+    test count for nothing: a force that stays may be the offset of a sensor. Zero where forces are not measured; and in
+    a simulated test unless states lower the squares of its residual by `friction.held_gain` of `decompose.toml`: else
+    it is not the start that the balance lacks.
     """
-    out = np.zeros(len(plant.states))
+    state, block = np.zeros(len(plant.states)), max(round(0.5 / (cutoff * test.dt)), 1)
+    force = actuator_forces(plant.machine, test.channels)
+    if force is None or not len(_friction_rows(plant)) or test.samples < 2 * block:
+        return state
     if not is_measured(test.record):
-        return out
-    known, deviation = (plant, follow(plant, test)), start_deviation()
-    block = max(round(0.5 / (cutoff * test.dt)), 1)
+        measured = leg_wrenches(plant, plant_motion(plant, test.motion).q, force).sum(axis=1)[:, plant.axes]
+        return _without_noise(_Balance(plant, test, 1), np.std(measured, axis=0))
+    balance = _Balance(plant, test, block)
+    rest, none = balance.left(state), np.zeros(len(plant.axes))
+    if not rest.any(axis=0).all():  # without any error: nothing is to be explained
+        return state
     for nth in range(ROUNDS):
-        slopes, places = start_wrenches(plant, test, known[1], out)
-        if not len(places):
-            return out
-        path = follow(plant, test, known, start=out)
-        wrench = evaluate_residuals(plant, test, ("wrench",), path=path).wrench
-        rest, slopes = (_varying(_averaged(x, block))[:, plant.axes] for x in (wrench, slopes))
-        rest = rest + slopes @ out[places]  # without any state
-        if not np.sum(rest**2, axis=0).all():  # a balance without any error: nothing is to be explained
-            return out
-        out[places] = _fitted(rest, slopes, out[places], deviation, white=nth == 0)
-        for row in _friction_rows(plant):
+        state = balance.fitted(state, rest, none, white=nth == 0)
+        rest = balance.left(state)
+    return state
+
+
+def _without_noise(balance: "_Balance", measured: Array) -> Array:
+    """States (n_states,) at the start that balance forces without noise, of this variation (a,) of their wrench.
+
+    The prior decides between states that the balance does not distinguish.
+    """
+    zero = state = np.zeros(len(balance.plant.states))
+    first = rest = balance.left(zero)
+    least = BALANCED * np.maximum(measured, SHOWN * measured.max())
+    if np.all(np.mean(first**2, axis=0) <= least**2):
+        return zero
+
+    def lowered(by: float) -> bool:
+        """Whether the states have lowered the squares of the balance by a factor."""
+        return bool(by * np.sum((rest / least) ** 2) <= np.sum((first / least) ** 2))
+
+    for nth in range(MOST_ROUNDS):
+        last, state = state, balance.fitted(state, rest, least, apart=NEAR if nth else APART, white=nth == 0)
+        rest = balance.left(state)
+        if np.abs(state - last).max() < SETTLED or (nth + 1 == ROUNDS and not lowered(2.0)):
+            break
+    return state if lowered(_number("friction.held_gain")) else zero
+
+
+class _Balance:
+    """What the balance of a test's forces leaves on the free axes, in means over blocks of samples, less its mean."""
+
+    def __init__(self, plant: Plant, test: MeasuredTest, block: int) -> None:
+        self.plant, self.test, self.block = plant, test, block
+        self.path, self.deviation = follow(plant, test), start_deviation()
+
+    def left(self, state: Array) -> Array:
+        """It (n, a) from states (n_states,) at the start on."""
+        path = follow(self.plant, self.test, (self.plant, self.path), start=state) if state.any() else self.path
+        return self._compared(evaluate_residuals(self.plant, self.test, ("wrench",), path=path).wrench)
+
+    def fitted(self, state: Array, rest: Array, least: Array, *, white: bool, apart: float = APART) -> Array:
+        """Most probable states (n_states,), linearised about others that leave `rest` (n, a): see `_fitted`."""
+        wrenches, places = start_wrenches(self.plant, self.test, self.path, about=state, apart=apart)
+        slopes, out = self._compared(wrenches), state.copy()
+        out[places] = _fitted(rest + slopes @ state[places], slopes, state[places], self.deviation, least, white)
+        for row in _friction_rows(self.plant):
             own = out[states_of(row)]
-            own /= max(float(np.linalg.norm(own)), 1.0)
-    return out
+            own /= max(float(np.linalg.norm(own)), 1.0)  # no more than full friction
+        return out
+
+    def _compared(self, x: Array) -> Array:
+        count = len(x) // self.block
+        means = x[: count * self.block].reshape(count, self.block, *x.shape[1:]).mean(axis=1)
+        return np.asarray(means - means.mean(axis=0))[:, self.plant.axes]
 
 
 def with_start(plant: Plant, test: MeasuredTest, cutoff: float) -> MeasuredTest:
@@ -106,23 +160,25 @@ def with_start(plant: Plant, test: MeasuredTest, cutoff: float) -> MeasuredTest:
     return replace(test, start={name: float(state) for name, state in pairs if state})
 
 
-def _fitted(rest: Array, slopes: Array, found: Array, deviation: float, white: bool) -> Array:
+def _fitted(rest: Array, slopes: Array, found: Array, deviation: float, least: Array, white: bool) -> Array:
     """Most probable states (k,) by what the balance (n, a) leaves without them, and its slopes (n, a, k).
 
-    Each has this prior deviation. The error is first that which the states `found` leave; `white`, without correlation,
-    as long as the states that are to explain the balance would be its own.
+    Each has this prior deviation, and the error at least `least` (a,). It is first that which the states `found` leave;
+    `white`, without correlation, as long as the states that are to explain the balance would be its own.
     """
     from scipy.optimize import lsq_linear
 
     count = len(found)
     for nth in range(WEIGHINGS):
         left = rest - slopes @ found
-        size = np.sum(left**2, axis=0)
+        size = np.maximum(np.sum(left**2, axis=0), np.finfo(float).tiny)
         share = np.zeros(len(size)) if white and nth == 0 else np.sum(left[1:] * left[:-1], axis=0) / size
-        error = np.sqrt(np.mean(_new(left, share) ** 2, axis=0))
+        error = np.sqrt(np.mean(_new(left, share) ** 2, axis=0)) + least
         rows = (_new(slopes, share[:, None]) / error[:, None]).reshape(-1, count)
-        rows, wanted = np.vstack([rows, np.eye(count) / deviation]), (_new(rest, share) / error).ravel()
-        found = lsq_linear(rows, np.append(wanted, np.zeros(count)), (-1.0, 1.0), method="bvls").x
+        wanted = (_new(rest, share) / error).reshape(-1, 1)
+        prior = np.eye(count, count + 1) / deviation
+        small = np.linalg.qr(np.vstack([np.hstack([rows, wanted]), prior]), mode="r")  # the same in few rows
+        found = lsq_linear(small[:, :-1], small[:, -1], (-1.0, 1.0), method="bvls").x
     return found
 
 
@@ -131,18 +187,13 @@ def largest_share(plant: Plant, start: Array) -> float:
     return max((float(np.linalg.norm(start[states_of(row)])) for row in _friction_rows(plant)), default=0.0)
 
 
+def _number(path: str) -> float:
+    """Number of `models/procedures/decompose.toml`."""
+    return load_parameters(models_folder() / "procedures" / "decompose.toml").number(path)
+
+
 def _friction_rows(plant: Plant) -> NDArray[np.void]:
     return np.array([row for row in plant.rows if law_of(row).friction_memory], plant.rows.dtype)
-
-
-def _averaged(x: Array, block: int) -> Array:
-    """Means of samples (n, ...) over blocks."""
-    count = len(x) // block
-    return np.asarray(x[: count * block].reshape(count, block, *x.shape[1:]).mean(axis=1))
-
-
-def _varying(x: Array) -> Array:
-    return np.asarray(x - x.mean(axis=0))
 
 
 def _new(x: Array, share: Array) -> Array:

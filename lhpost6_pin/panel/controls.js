@@ -119,7 +119,7 @@ function upNext() { // the id of what comes next, and the step in words
   if (source() === "generator" && still().length && still().length === checked("generator").length)
     return [`span-${still()[0]}`, `Next: set the span of ${still()[0]}, for instance ${hello.units[still()[0]] === "deg" ? "1 deg" : "100 mm"}; or choose a motion.`];
   const why = amiss();
-  return ["run", why ? `Next: ${why}.` : `Ready: Run starts the ${source() === "motion" ? "motion" : "function generator"}.`];
+  return ["run", why ? `Next: ${why}.` : `Ready: Run checks and starts the ${source() === "motion" ? "motion" : "function generator"}.`];
 }
 export function lock(why) { // all controls
   for (const control of document.querySelectorAll("header button, main button, main input, main select")) {

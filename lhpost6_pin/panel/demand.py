@@ -20,7 +20,7 @@ def check_program(plant: Plant, program: Program, gain: Array, setpoint: Array) 
     """Check the motion of a program times `gain` (6,) about a setpoint (6,) at full rate of its clock.
 
     Raises OutOfRangeError naming the limits that it exceeds, in the units of the page, and the largest scale that fits:
-    of a motion as of its field, of a wave as a share of the spans.
+    of a motion as of its field, of a wave as a share of the spans. What the page cannot change is no remedy.
     """
     seconds = program.duration or _LONGEST
     frequency = getattr(program, "frequency", None)
@@ -32,4 +32,4 @@ def check_program(plant: Plant, program: Program, gain: Array, setpoint: Array) 
     scale = 1.0 if program.by_span else float(np.abs(gain).max())
     reference = Reference(program.name, "panel", scale, axes, 0.0, 0.0, 0.0)
     rows = (setpoint + gain * moved.value, gain * moved.rate, gain * moved.acceleration)
-    check_motion_limits(plant, Target(time, *rows, reference), PAGE_UNITS)
+    check_motion_limits(plant, Target(time, *rows, reference), PAGE_UNITS, remedies=False)

@@ -1,7 +1,7 @@
 """Tables as CSV or other text, and Parquet: a row a sample, a column a channel, units in the header or a row of units.
 
 Text may be separated by commas, semicolons, tabs or blanks, with decimal points or commas. Lines that begin with
-`#` or `%` are comments; `# key: value` among them are facts about the test.
+`#` or `%` are comments; `# key: value` among them are facts about the test. A column of clock times is time.
 """
 
 import re
@@ -23,6 +23,7 @@ from ...core.number_table import (
 )
 from ...core.units import quantity_unit
 from .channel_units import si_factor, time_unit, unit_in_name
+from .clock_stamps import is_stamp, take_stamps
 from .raw import RawTest, make_raw, shown
 
 __all__ = ["read_parquet", "read_table"]
@@ -50,13 +51,16 @@ def read_table(content: bytes, source: str) -> RawTest:
     layout = _sniff(lines, source)
     names, units = _head(lines, layout, source)
     rows = [(k, line) for k, line in enumerate(lines[layout.first :], layout.first + 1) if not _is_comment(line)]
+    stamped, rows, seconds = take_stamps(rows, layout.dialect, names, source)
     remedy = "correct it, or leave it empty for a missing sample"
     refused: dict[str, Any] = {"error": RecordError, "commas": _COMMAS, "correct": remedy}
     values = read_rows(rows, names, layout.dialect, source, **refused, holes=True)
+    if stamped is not None:
+        values[:, stamped], units[stamped] = seconds, "s"
     if not names[-1] and np.isnan(values[:, -1]).all():  # each line ends with a separator
         names, units, values = names[:-1], units[:-1], values[:, :-1]
     facts = {m["key"]: m["value"].strip() for line in lines[: layout.first] if (m := _FACT.fullmatch(line.strip()))}
-    return _raw_of_columns(source, "table in text", names, units, values, facts)
+    return _raw_of_columns(source, "table in text", names, units, values, facts, stamped)
 
 
 def _decoded(content: bytes) -> str:
@@ -91,15 +95,27 @@ def _sniff(lines: Sequence[str], source: str) -> _Layout:
             best = score, _Layout(dialect, first, count)
     if best is None:
         quoted = any(has_decimal_comma(field) for line in lines[:_SAMPLE] for field in Dialect(",").split(line))
-        remedy = _COMMAS if quoted else "give a header row of names, then one row per sample"
+        remedy = _COMMAS if quoted else _odd_field(lines) or "give a header row of names, then one row per sample"
         raise RecordError(f"{source}: no row of numbers found; {remedy}")
     return best[1]
+
+
+def _odd_field(lines: Sequence[str]) -> str:
+    """The first field that is no number in the first line of which most are; empty if there is none."""
+    for number, line in enumerate(lines[:_SAMPLE], start=1):
+        for dialect in () if _is_comment(line) else (Dialect(s) for s in _SEPARATORS):
+            fields = dialect.split(line)
+            odd = [k for k, field in enumerate(fields) if not _fits(field, dialect)]
+            if 0 < len(odd) < 0.5 * len(fields):
+                what = f"line {number}, column {odd[0] + 1}: {fields[odd[0]][:40]!r}"
+                return f"{what} is neither a number nor a time as 12:00:00.25; correct that column, or leave it out"
+    return ""
 
 
 def _fits(field: str, dialect: Dialect) -> bool:
     """Whether a field may stand in a row of numbers."""
     whole = is_number(field, dialect) and not (dialect.decimal == "," and "." in field)
-    return whole or field.lower() in HOLES
+    return whole or field.lower() in HOLES or is_stamp(field)
 
 
 def _head(lines: Sequence[str], layout: _Layout, source: str) -> tuple[list[str], list[str | None]]:
@@ -144,12 +160,20 @@ def read_parquet(content: bytes, source: str, form: str) -> RawTest:
 
 # --------------------------------------------------------------------------------------------- both
 def _raw_of_columns(
-    source: str, form: str, names: Sequence[str], units: Sequence[str | None], values: Array, facts: dict[str, str]
+    source: str,
+    form: str,
+    names: Sequence[str],
+    units: Sequence[str | None],
+    values: Array,
+    facts: dict[str, str],
+    stamped: int | None = None,
 ) -> RawTest:
-    """Take the column of time out of a table."""
+    """Take the column of time out of a table: one named so, else that of clock times, `stamped`."""
     clocks = [k for k, name in enumerate(names) if time_unit(name, units[k])]
     if len(clocks) > 1:
         raise RecordError(f"{source}: {shown([names[k] for k in clocks])} are all named as time; rename all but one")
+    if not clocks and stamped is not None:
+        clocks = [stamped]
     if not clocks:  # named in a language of its own
         own = [k for k, unit in enumerate(units) if unit and quantity_unit(unit) == "s"]
         clocks = [k for k in own[:1] if len(values) > 1 and np.all(np.diff(values[:, k]) > 0)]

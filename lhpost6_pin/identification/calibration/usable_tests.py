@@ -1,6 +1,6 @@
 """Tests of a campaign that can be compared with a model: not too short nor too slow, no force sensor dead in one alone.
 
-A test that cannot is skipped, with the reason; the others are used.
+A test that cannot is skipped, with the reason; the others are used, a recording that tripped up to its trip.
 """
 
 import logging
@@ -15,6 +15,7 @@ from ...data.campaign import Campaign, SkippedTest
 from ...data.channels import calibrated_channels, columns_of
 from ...data.conditioning import resolutions
 from ...data.records import is_measured
+from ...data.served_samples import before_trip
 from .result import calibration_numbers
 from .whitened_residuals import spectrum_of
 
@@ -32,9 +33,9 @@ _ALIVE = 100.0
 def usable_tests(campaign: Campaign) -> Campaign:
     """The campaign without the tests that cannot be compared, which join its `skipped`; each is logged as a warning.
 
-    Raises RecordError with the first reason if none is left.
+    Those that tripped are cut there (`before_trip`). Raises RecordError with the first reason if none is left.
     """
-    numbers = calibration_numbers()
+    campaign, numbers = campaign._replace(records=tuple(map(before_trip, campaign.records))), calibration_numbers()
     bands, edge = numbers.vector("comparison.bands"), numbers.number("comparison.edge")
     why = [too_short(record, bands, edge) for record in campaign.records]
     long = [record for record, reason in zip(campaign.records, why, strict=True) if not reason]

@@ -21,6 +21,7 @@ from ...data.channels import MOTION
 from ...data.measured_sensors import find_sensors
 from ...data.records import is_measured, require, sample_interval
 from ...data.sensors import SensorSet
+from ...data.served_samples import before_trip, trip_note
 from ...data.signals import Band
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
@@ -112,12 +113,13 @@ def decompose_record(
 ) -> Decomposed:
     """Decompose a record with a machine's equations; sensors by default those of `find_sensors`.
 
-    cutoff [Hz] is by default that of `decompose.toml`.
+    cutoff [Hz] is by default that of `decompose.toml`. A recording that tripped is decomposed up to its trip.
     Actuator forces come from chamber pressures where they were not measured. The number of open servovalves has no
     effect. The specimen is the machine's, else the one that the record names; its wrench on the platen is the effect
     `specimen` of the ledger. Raises RecordError for a record that lacks channels, is not finite, of another machine or
     specimen, out of stroke or too short.
     """
+    record = before_trip(record)
     machine = machine.as_mounted(record.attrs, source_of(record))
     check_usable(machine, record)
     numbers, dt, mounted = decompose_numbers(), sample_interval(record), make_plant(machine)
@@ -149,7 +151,7 @@ def decompose_record(
         raise RecordError(
             f"{source_of(record)}: {n * test.dt:.3g} s are too short; {comparison.edge:g} s at each end are cut off"
         )
-    inside = slice(cut, n - cut)
+    notes, inside = (*trip_note(record), *notes), slice(cut, n - cut)
     forces, motion = _filtered(whole, test.motion, band, test.dt, inside)
     return Decomposed(test, sensors, comparison, whole, forces, motion, inside, delays, notes, mounted)
 
@@ -161,7 +163,7 @@ def decompose_test(
 
     The equations are those of the table without specimen; the wrench of a specimen on the plant is an effect, as its
     model predicts it, or as its floors' accelerations show it where they were measured. start (n_states,) are the
-    states of friction at the start; by default those of `estimate_start` in a measured test, zero in a simulated one.
+    states of friction at the start; by default those of `estimate_start`.
     """
     mounted, plant = plant, bare(plant)
     record, force = test.record, actuator_forces(plant.machine, test.channels)

@@ -7,11 +7,12 @@ found.phase("TX", 1).of("wrench")       # agreement of required and measured act
 import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 from joblib import Parallel, delayed
 
@@ -25,6 +26,7 @@ from ...data.alignment import Delay, align_record
 from ...data.campaign import Campaign
 from ...data.measured_sensors import find_sensors
 from ...data.sensors import SensorSet
+from ...data.served_samples import before_trip, trip_note
 from ...machine.machine import Machine
 from ...mechanics.linearize import oil_column_modes
 from ...mechanics.plant import make_plant
@@ -88,9 +90,10 @@ def validate(
 
     settings replace those that records name. Significant skews between channel groups are removed first. A missing
     channel disables only the phases that need it, with a reason; RecordError if no phase of any test is possible, or if
-    two tests have one name.
+    two tests have one name. A recording that tripped is compared up to its trip, with a note.
     """
     _check_names(campaign)
+    campaign = campaign._replace(records=tuple(map(before_trip, campaign.records)))
     sensors, numbers = sensors or find_sensors(machine, campaign.records), validation_numbers()
     plant = make_plant(machine)
     enough = [record for record in campaign.records if _seconds(record) >= numbers.shortest]
@@ -118,7 +121,7 @@ def validate(
 
 def _seconds(record: xr.Dataset) -> float:
     """Length of a record [s]."""
-    return float(record["time"][-1] - record["time"][0])
+    return float(np.ptp(record["time"].values)) if record.sizes["time"] else 0.0
 
 
 def _check_names(campaign: Campaign) -> None:
@@ -145,8 +148,10 @@ def _phases_of(
     except LhpostError as error:
         name, time = str(record.attrs.get("test", "test")), record["time"].values
         test, why = None, str(error)
+    trip = trip_note(record)
     for number in phases:
-        found.append(Phase(number, name, time, reason=why) if test is None else run_phase(number, test))
+        phase = Phase(number, name, time, reason=why) if test is None else run_phase(number, test)
+        found.append(replace(phase, notes=(*trip, *phase.notes)))
         count()
     return found
 

@@ -214,7 +214,8 @@ def _assumptions(found: Decomposed) -> list[Block]:
         *filter(None, [found.slip]),
         f"All compared signals are low-passed by one zero-phase filter (gain 1/2 at {band.high:g} Hz, order "
         f"{band.order}); {found.comparison.edge:g} s at each end are omitted. Friction states are integrated along the "
-        "unfiltered motion, from rest. Power and energy are those of the unfiltered forces.",
+        "unfiltered motion, from zero unless seals or pads hold a force at the start. Power and energy are those of "
+        "the unfiltered forces.",
         assumed_in(found.plant.machine),
     ]
     if found.sensors is not None:

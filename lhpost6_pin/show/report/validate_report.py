@@ -126,7 +126,7 @@ def _assumptions(found: Validation) -> list[Block]:
         f"All compared signals are low-passed by one zero-phase filter (gain 1/2 at {band.high:g} Hz, order "
         f"{band.order}); {found.numbers.edge:g} s at each end are omitted. Spectra are not filtered.",
         "Open-loop runs start in the control zero-position with the first recorded pressures and with what seals and "
-        "pads hold then by the balance of forces (nothing in a simulated test, or with a specimen that moves).",
+        "pads hold then by the balance of forces (nothing with a specimen that moves).",
         f"Noise is the change caused by adding the noise of “{sensors.name}” to a record once more; {guessed} of its "
         f"{len(sensors.parameters)} numbers are assumed. Gains and offsets of sensors are not corrected.",
         *(

@@ -148,7 +148,7 @@ def _residual_blocks(found: Validation) -> list[Block]:
         return []
     columns = [a.column for a in next(iter(tests.values()))]
     ratios: list[tuple[str, ...]] = [
-        (test, *(f"{'! ' * (not 1 / NOISE < a.error_to_noise < NOISE)}{number(a.error_to_noise)}" for a in own))
+        (test, *(f"{'! ' * (a.error_to_noise > NOISE)}{number(a.error_to_noise)}" for a in own))
         for test, own in tests.items()
     ]
     ratios.append(("noise predicted", *map(_span, zip(*tests.values(), strict=True))))
@@ -158,10 +158,10 @@ def _residual_blocks(found: Validation) -> list[Block]:
     units, heads = [f"{column} [{scale_of('wrench', column).unit}]" for column in columns], ("Test", *columns)
     return [
         "Residual of inverse dynamics (required less measured actuator force, mean and delay removed) over its "
-        f"predicted sensor noise. 1 is noise alone; ! marks more than {NOISE:g} (incomplete model) and less than "
-        f"{1 / NOISE:g} (stated noise too large). The last row is that noise, one standard deviation. Gain errors of "
-        "sensors add to the residual of moving axes.",
-        Table(f"Residual of inverse dynamics over the noise predicted (! beyond {NOISE:g} times)", heads, ratios),
+        f"predicted sensor noise. 1 is noise alone; ! marks more than {NOISE:g} (incomplete model). Far below 1 the "
+        "record has less noise than is stated, or none. The last row is the predicted noise, one standard deviation. "
+        "Gain errors of sensors add to the residual of moving axes.",
+        Table(f"Residual of inverse dynamics over the noise predicted (! above {NOISE:g})", heads, ratios),
         "Mean of required less measured force by inverse dynamics. The last row is its uncertainty from gains and "
         "offsets of the sensors of force (load cells, else pressures), one standard deviation; ! marks more than "
         f"{SENSED:g} of them: a weight, a pressure or a sensor is wrong.",

@@ -1,7 +1,8 @@
 """What seals and pads hold at the start of a test, from where the platen came: friction's hidden states then.
 
-Nothing measures them. They change the balance of forces until the platen has travelled some yield slips, nearly in
-proportion: two states along one slip differ by an amount that decays with the travel.
+Nothing measures them. They change the balance of forces until the platen has travelled some yield slips: two states
+along one slip differ by an amount that decays with the travel. Well below full friction it is in proportion to the
+state, near it is not: the balance is linearised about each estimate.
 """
 
 from dataclasses import replace

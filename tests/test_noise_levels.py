@@ -10,6 +10,7 @@ from commands import refused
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from machine_cases import PRACTICE
+from scipy.linalg import null_space
 from sensor_cases import with_change
 
 from lhpost6_pin.control import load_controller
@@ -19,11 +20,12 @@ from lhpost6_pin.data.check import check_dataset
 from lhpost6_pin.data.consistency import check_sensors
 from lhpost6_pin.data.fusion import fuse_motion
 from lhpost6_pin.data.layout_faults import FASTEST, SLOWEST
+from lhpost6_pin.data.mass_regression import mass_fits
 from lhpost6_pin.data.measured_sensors import compare_noise, find_sensors, measured_sensors, save_sensors
 from lhpost6_pin.data.noise_levels import noise_levels
 from lhpost6_pin.data.observable import observable
 from lhpost6_pin.data.records import load_record, make_record, sample_interval, save_record
-from lhpost6_pin.data.rests import find_rests
+from lhpost6_pin.data.rests import find_rests, rest_numbers
 from lhpost6_pin.data.sensors import SensorSet, add_noise, load_sensors
 from lhpost6_pin.data.signals import Band, align, differentiate
 from lhpost6_pin.data.turned_signs import turned_signs
@@ -329,6 +331,23 @@ def test_a_turned_force_is_found_in_a_slow_sine_in_which_friction_hides_inertia(
     (turned,) = with_change([record], "actuator_force", lambda x: x * signs)
     (found,) = turned_signs(turned, machine)
     assert found.channel == f"actuator_force[{machine.actuator_names[column]}]" and "takes energy" in found.message
+
+
+def test_an_actuator_that_takes_what_the_others_give_is_not_turned():
+    """Four horizontal actuators for three degrees of freedom: forces in balance with each other do no net work."""
+    machine, record = load_machine(), load_record(PRACTICE)
+    rows = kinematic_jacobian(make_plant(machine))
+    balanced = null_space(rows[:4, [0, 1, 5]].T)[:, 0]
+    speed = record["platen_velocity"].values[:, 0] * np.sign(rows[0, 0] * balanced[0])
+    size = 4.0 * record["actuator_force"].values[:, :4].std() / speed.std()
+
+    def working(force: np.ndarray) -> np.ndarray:
+        return force - size * np.outer(speed, np.append(balanced, np.zeros(6)))
+
+    (against,) = with_change([record], "actuator_force", working)
+    fits = {fit.actuator: fit for fit in mass_fits(against, machine, rest_numbers())}
+    assert fits["H1"].given < -0.25 and fits["H1"].by_mass < 0.6
+    assert turned_signs(against, machine) == []
 
 
 def test_a_late_force_of_inertia_is_no_turned_one():

@@ -2,7 +2,9 @@
 
 Where the regression of a force on the motion (`mass_regression`) explains it with the coefficients of mass and friction
 negative, its sign is turned. So it is where inertia is small beside friction, as in a slow sine, and the actuator takes
-energy from the platen throughout: friction and dampers only dissipate, and springs give back what they took.
+energy from the platen throughout, against the sign of its mass: friction and dampers only dissipate, and springs give
+back what they took. One of several that are more than the platen's degrees of freedom may take what the others give;
+its mass is positive then.
 Two such forces along which the motion is opposite may as well be exchanged: the record does not distinguish these.
 """
 
@@ -33,13 +35,14 @@ def turned_signs(record: xr.Dataset, machine: Machine, fits: Sequence[MassFit] |
     numbers = rest_numbers()
     found: list[tuple[MassFit, str]] = []
     least, most = numbers.vector("sign.share")
+    taken = numbers.number("sign.taken")
     low, high = numbers.vector("sign.band")
     for fit in mass_fits(record, machine, numbers) if fits is None else fits:
         firm = fit.explained >= numbers.number("sign.explained")
         if firm and least <= -fit.share <= most and fit.power < 0:
             what = f"opposes the motion that it causes, mass and friction alike, from {low:g} to {high:g} Hz"
             found.append((fit, what))
-        elif fit.by_mass < numbers.number("sign.explained") and fit.given <= -numbers.number("sign.taken"):
+        elif fit.share < 0.0 and fit.by_mass < numbers.number("sign.explained") and fit.given <= -taken:
             what = f"takes energy from the platen throughout (power over apparent power {fit.given:.2f})"
             found.append((fit, what))
     turned = {fit.channel for fit, _ in found}

@@ -5,8 +5,6 @@ along one slip differ by an amount that decays with the travel. Well below full 
 state, near it is not: the balance is linearised about each estimate.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,7 +20,7 @@ from .prepare import MeasuredTest, actuator_forces
 from .residual_kernels import row_wrenches
 from .residuals import Path, evaluate_residuals, follow
 
-__all__ = ["estimate_start", "largest_share", "start_deviation", "start_wrenches", "with_start"]
+__all__ = ["estimate_start", "largest_share", "start_deviation", "start_wrenches"]
 
 APART, NEAR = 0.5, 1e-3
 """Change of a state, of full friction, either way, by which that of the wrench is taken; and so without noise, where
@@ -50,15 +48,15 @@ def start_wrenches(
 ) -> tuple[Array, NDArray[np.intp]]:
     """Wrenches (n, 6, k) on the platen at C in {c} [N, N m] by a unit of each of k states at the start; their places.
 
-    Differences between states `apart` above and below `about` (n_states,), by default the test's own, and within full
-    friction. path is that of `follow`, if it is known. There are none (k = 0) where forces are not measured, as there
-    is no balance of them.
+    Differences between states `apart` above and below `about` (n_states,), by default zero, and within full friction.
+    path is that of `follow`, if it is known. There are none (k = 0) where forces are not measured, as there is no
+    balance of them.
     """
     force, rows = actuator_forces(plant.machine, test.channels), _friction_rows(plant)
     if force is None or not len(rows):
         return np.zeros((test.samples, 6, 0)), np.zeros(0, np.intp)
     known = plant, path or follow(plant, test)
-    middle = test.states_at_start(plant.states) if about is None else about
+    middle = np.zeros(len(plant.states)) if about is None else about
     sizes = [states_of(row).stop - states_of(row).start for row in rows]
     found, places = [], []
     for nth in range(max(sizes)):
@@ -153,12 +151,6 @@ class _Balance:
         count = len(x) // self.block
         means = x[: count * self.block].reshape(count, self.block, *x.shape[1:]).mean(axis=1)
         return np.asarray(means - means.mean(axis=0))[:, self.plant.axes]
-
-
-def with_start(plant: Plant, test: MeasuredTest, cutoff: float) -> MeasuredTest:
-    """The test with friction's states at its start by `estimate_start`."""
-    pairs = zip(plant.states, estimate_start(plant, test, cutoff), strict=True)
-    return replace(test, start={name: float(state) for name, state in pairs if state})
 
 
 def _fitted(rest: Array, slopes: Array, found: Array, deviation: float, least: Array, white: bool) -> Array:

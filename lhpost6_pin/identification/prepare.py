@@ -82,7 +82,6 @@ class MeasuredTest:
     side: Array | None = None  # (2, n, n_actuators) of its play on which a pin stands, -1 to 1, and rate; NaN: unknown
     record: xr.Dataset = field(default_factory=xr.Dataset)  # aligned
     weight: Array | None = None  # (n,) of the wrench residual, less where friction's state is unknown; None: one
-    start: Mapping[str, float] = field(default_factory=dict)  # states of friction at the start, where not zero, by name
     substeps: int = 1  # in which friction is marched between samples
     carried: Array | None = None  # (n, 6) at B in platen axes: wrench of a moving specimen beyond that of a rigid one
 
@@ -90,10 +89,6 @@ class MeasuredTest:
     def samples(self) -> int:
         """Number of samples."""
         return len(self.motion.displacement)
-
-    def states_at_start(self, names: Sequence[str]) -> Array:
-        """States (n_states,) of a plant that has those of these `names`, as friction begins with them."""
-        return np.array([self.start.get(name, 0.0) for name in names])
 
     def with_channels(self, **channels: Array | None) -> "MeasuredTest":
         """The same test with other values of some channels; without those that are None."""

@@ -80,8 +80,8 @@ def follow(
     """Path of a test; raises RecordError naming the sample where a leg is out of its stroke.
 
     Raises SimulationError for a specimen that moves on joints or in modes. What does not differ from the `known` path
-    of the same motion with another plant is reused; where `start` is given, its ports alone: friction's states
-    (n_states,) at the start, in place of the test's own.
+    of the same motion with another plant is reused; where the states at the start are given, its ports alone. start
+    (n_states,) are the friction states at the start, if not zero.
     """
     if plant.flexible:
         raise SimulationError("residuals take a rigid specimen at most; what a moving one exerts beyond is `carried`")
@@ -100,14 +100,13 @@ def follow(
             return Path(ports, along, required, old)
         there = {key: old[:, place] for key, place in before}
         same = len(before) if before == [one[:2] for one in plant.moving[: len(before)]] else 0
-    began = test.states_at_start(plant.states) if start is None else start
     fresh = {one.key: one for one in plant.moving if one.key not in there}
     # oscillators and heat average noise, and need the raw motion
     parts: tuple[list[MovingRow], list[MovingRow]] = [], []
     for one in fresh.values():
         parts[test.path is not None and law_of(one.row).follows_motion].append(one)
     for some, way in zip(parts, (along, ports), strict=True):
-        there.update(march_finely(plant, way, test, some, began))
+        there.update(march_finely(plant, way, test, some, start))
     z = np.zeros((test.samples, len(plant.states)))
     if same and old.shape[1] <= z.shape[1]:
         z[:, : old.shape[1]] = old

@@ -18,7 +18,7 @@ from ...machine.machine import Machine
 from ...machine.specimen import Specimen
 from ...mechanics.plant import Plant, make_plant
 from ..friction_march import made_fine
-from ..friction_start import start_wrenches, with_start
+from ..friction_start import start_wrenches
 from ..prepare import MeasuredTest
 from ..residual_change import Evaluated, change_of
 from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, kinds_shown
@@ -84,12 +84,12 @@ class Problem:
         """
         self.delays, plant = delays, make_plant(machine)
         self.axes = plant.axes  # free twist components of the platen
-        tests = tuple(with_start(plant, made_fine(plant, test), comparison.bands[-1]) for test in tests)
+        tests = tuple(made_fine(plant, test) for test in tests)
 
         def weighed(some: Sequence[MeasuredTest]) -> tuple[MeasuredTest, ...]:
-            """Draws of the tests in order, any number of times, with the weights and starts of the tests."""
+            """Draws of the tests in order, any number of times, with the weights of the tests."""
             each = zip(some, cycle(tests), strict=False)
-            return tuple(replace(t, weight=own.weight, substeps=own.substeps, start=own.start) for t, own in each)
+            return tuple(replace(t, weight=own.weight, substeps=own.substeps) for t, own in each)
 
         self.tests, self.comparison, self.jobs, self.kinds = tests, comparison, jobs, kinds
         self.noisy, self.again = weighed(noisy), tuple(map(weighed, again))

@@ -1,9 +1,9 @@
 """Friction's state at the start of a test, which nothing measures: what it changes is taken out of the residuals.
 
-The change of the whitened bins by each state, about those estimated (`friction_start`), is known but for its size, for
-which there is a prior. Without it the covariance of the bins is the identity I, with it I + D D^T, where D are those
-changes, one prior deviation each; what is compared is multiplied by the inverse root of that: along the singular
-vectors of D by (1 + s^2)^-1/2, elsewhere by one. This is the estimate with one more unknown for each state.
+The change of the whitened bins by each state (`friction_start`) is known but for its size, for which there is a prior.
+Without it the covariance of the bins is the identity I, with it I + D D^T, where D are those changes, one prior
+deviation each; what is compared is multiplied by the inverse root of that: along the singular vectors of D by
+(1 + s^2)^-1/2, elsewhere by one. This is the estimate with one more unknown for each state.
 """
 
 from typing import NamedTuple

@@ -170,7 +170,8 @@ def _fitted(rest: Array, slopes: Array, found: Array, deviation: float, least: A
         rows = (_new(slopes, share[:, None]) / error[:, None]).reshape(-1, count)
         wanted = (_new(rest, share) / error).reshape(-1, 1)
         prior = np.eye(count, count + 1) / deviation
-        small = np.linalg.qr(np.vstack([np.hstack([rows, wanted]), prior]), mode="r")  # the same in few rows
+        whole = np.vstack([np.hstack([rows, wanted]), prior])
+        small = np.asarray(np.linalg.qr(whole, mode="r"))  # the same in few rows
         found = lsq_linear(small[:, :-1], small[:, -1], (-1.0, 1.0), method="bvls").x
     return found
 

@@ -65,8 +65,7 @@ def find_sensor_faults(
     Axes of the displacement that are turned are turned back before anything else is judged. Play of actuators that are
     `loose` shifts the means of their lengths, which are not reported.
     """
-    upright = [turned_displacement(record, plant.machine)[0] for record in records]
-    turned = _in_most(upright)
+    turned = _in_most([turned_displacement(record, plant.machine)[0] for record in records])
     records = correct_records(records, turned)
     findings = check_sensors(plant, records, sensors)
     late = _late(findings, sensors)

@@ -130,13 +130,13 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     n, single = found.numbers.number, len(found.problem.machine.actuators) == 1
     less = without_effect(found, one.candidate)
     before = residual_at(held, less.solution)
-    family, both = one.candidate.family, (before.whitened, after.whitened)
+    family = one.candidate.family
     rows = rows_shown(held, family)
     gain, expected = gain_on(held, before, after, rows)
     withdrawn = Withdrawn(one.candidate.name, family.named, "held_out", gain=gain)
     if not single and expected <= n("accept.chance"):
         return None
-    share = share_explained(held, *both, family, found.numbers)
+    share = share_explained(held, before.whitened, after.whitened, family, found.numbers)
     if not single and np.isnan(share):
         return withdrawn if gain < 0.0 else None
     if gain < max(np.sqrt(2.0 * expected), n("accept.held_out") * expected):

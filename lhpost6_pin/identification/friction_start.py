@@ -92,13 +92,12 @@ def estimate_start(plant: Plant, test: MeasuredTest, cutoff: float) -> Array:
     if not is_measured(test.record):
         measured = leg_wrenches(plant, plant_motion(plant, test.motion).q, force).sum(axis=1)[:, plant.axes]
         return _without_noise(_Balance(plant, test, 1), np.std(measured, axis=0))
-    balance = _Balance(plant, test, block)
-    rest, none = balance.left(state), np.zeros(len(plant.axes))
-    if not rest.any(axis=0).all():  # without any error: nothing is to be explained
-        return state
+    balance, none = _Balance(plant, test, block), np.zeros(len(plant.axes))
     for nth in range(ROUNDS):
-        state = balance.fitted(state, rest, none, white=nth == 0)
         rest = balance.left(state)
+        if not rest.any(axis=0).all():  # without any error: nothing is to be explained
+            break
+        state = balance.fitted(state, rest, none, white=nth == 0)
     return state
 
 
@@ -162,6 +161,7 @@ def _fitted(rest: Array, slopes: Array, found: Array, deviation: float, least: A
     from scipy.optimize import lsq_linear
 
     count = len(found)
+    prior = np.eye(count, count + 1) / deviation
     for nth in range(WEIGHINGS):
         left = rest - slopes @ found
         size = np.maximum(np.sum(left**2, axis=0), np.finfo(float).tiny)
@@ -169,7 +169,6 @@ def _fitted(rest: Array, slopes: Array, found: Array, deviation: float, least: A
         error = np.sqrt(np.mean(_new(left, share) ** 2, axis=0)) + least
         rows = (_new(slopes, share[:, None]) / error[:, None]).reshape(-1, count)
         wanted = (_new(rest, share) / error).reshape(-1, 1)
-        prior = np.eye(count, count + 1) / deviation
         whole = np.vstack([np.hstack([rows, wanted]), prior])
         small = np.asarray(np.linalg.qr(whole, mode="r"))  # the same in few rows
         found = lsq_linear(small[:, :-1], small[:, -1], (-1.0, 1.0), method="bvls").x

@@ -32,6 +32,7 @@ __all__ = ["Setup", "come_first", "control", "panel_numbers", "program_of", "row
 
 _IDLE = 0.1  # [s] between looks at orders
 _POLL = 150e-6  # [s] of polling for the sensors of a plant that catches up
+_POLLED = 20e-6  # [s] of polling before a deadline of the plant's, which leaves the processor to the page's drawing
 _HURRIED = 0.9 * SECOND / SAMPLE_RATE  # [ns] between its samples
 _SILENCE = 1.0  # [s] without sensors until the link is lost
 _PATIENCE = 1.0  # [s] that a plant of its own waits for a command before its controller counts as dead
@@ -281,5 +282,5 @@ def serve_plant(pipe: Connection, machine: Machine, faults: Sequence[str], pace:
     threading.Thread(target=wait, daemon=True).start()
     with open_socket(port=0) as sock:
         pipe.send(sock.getsockname())
-        serve(sock, served, stop=stop, pace=pace, patience=_PATIENCE)
+        serve(sock, served, stop=stop, pace=pace, patience=_PATIENCE, polled=_POLLED)
     os._exit(0)

@@ -23,7 +23,6 @@ HOST, PORT = "127.0.0.1", 46946
 """Default address: this computer only, at a port of the private range."""
 
 _IDLE = 0.1  # [s] longest wait before looking at the stop event
-_SPIN = 150_000  # [ns] before a deadline that are spent polling, not sleeping: sleep ends up to 0.1 ms late
 _POLL = 150_000  # [ns] of polling for an awaited command before sleeping, which takes 0.05 ms to wake up from
 _CATCHING_UP = 20_000_000  # [ns] most that a clock is behind by a disturbance; one further behind is always too slow
 _BEHIND = 0.1  # [s] most that a clock that waits catches up with
@@ -58,16 +57,18 @@ def serve(
     seconds: float | None = None,
     pace: float = 1.0,
     patience: float = 0.0,
+    polled: float = 150e-6,
 ) -> Timing:
     """Answer datagrams and move the plant until `stop` is set, Ctrl-C is pressed or `seconds` are over.
 
     Real time: sample k of a run is due k/2048 s after its first command came, whatever became of those before; `pace`
     is a factor on the speed of that clock, below one for a computer that is too slow. With `patience` [s] every sample
     waits for the command that answers the sensors before it, up to that long, and the clock catches up with at most
-    0.1 s afterwards: the run is that of lock-step on any computer, which delays it where it is too slow. The plant goes
-    to its safe hold where a client is silent for longer, or states by `LinkClient.keep` that it does not command. The
-    counts are in `served.counts`. Raises LinkError for a time that is negative or not finite, or a pace that is not
-    positive.
+    0.1 s afterwards: the run is that of lock-step on any computer, which delays it where it is too slow. The last
+    `polled` [s] before a deadline are polled, not slept, since sleep ends up to 0.1 ms late; less of it leaves more of
+    the processor to others. The plant goes to its safe hold where a client is silent for longer, or states by
+    `LinkClient.keep` that it does not command. The counts are in `served.counts`. Raises LinkError for a time that is
+    negative or not finite, or a pace that is not positive.
     """
     if not 0.0 < pace < math.inf:
         raise LinkError(f"a pace of {pace:g}; give a number above zero, 1 for real time")
@@ -86,11 +87,11 @@ def serve(
                     continue
                 begin, sample = (now(), 0) if sample < 0 else (begin, sample + 1)
                 if served.mode == LinkMode.FREE:
-                    _listen_until(sock, served, now())
+                    _listen_until(sock, served, now(), 0)
                     _tick(sock, served)
                     continue
                 due = begin + round(sample * SECOND / (SAMPLE_RATE * pace))
-                _listen_until(sock, served, due)
+                _listen_until(sock, served, due, round(polled * SECOND))
                 if patience:
                     _await(sock, served, due, patience, stop)
                     begin += max(0, now() - due - round(_BEHIND * SECOND))
@@ -112,10 +113,10 @@ def _tick(sock: socket.socket, served: ServedPlant) -> None:
         _send(sock, answer, client)
 
 
-def _listen_until(sock: socket.socket, served: ServedPlant, due: int) -> None:
-    """Receive until a time [ns], and what has arrived by then."""
+def _listen_until(sock: socket.socket, served: ServedPlant, due: int, polled: int) -> None:
+    """Receive until a time [ns], polling at last for as long as stated [ns], and what has arrived by then."""
     while (left := due - now()) > 0:
-        _listen(sock, served, max(0, left - _SPIN) / SECOND)
+        _listen(sock, served, max(0, left - polled) / SECOND)
     for _ in range(_BURST):
         if not _listen(sock, served, 0.0):
             break

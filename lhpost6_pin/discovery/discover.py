@@ -312,9 +312,11 @@ def _least_informative(first: NormalEquations) -> int:
 
 
 def _hash(record: xr.Dataset) -> str:
-    """SHA-256 of a record's numbers."""
+    """SHA-256 of a record's numbers and names, the same in memory and read from a file."""
     digest = hashlib.sha256()
     for name in sorted(map(str, record.variables)):
+        values = record[name].values
         digest.update(name.encode())
-        digest.update(np.ascontiguousarray(record[name].values).tobytes())
+        # an array of objects holds addresses; names have another width in each record
+        digest.update(values.tobytes() if values.dtype.kind in "biuf" else repr(values.tolist()).encode())
     return digest.hexdigest()

@@ -77,7 +77,7 @@ def expected_gaps(
             continue
         try:
             began = [start for n in own if (start := compared[test, n].start) is not None]
-            simulated = _simulated(machine, clean, noisier, rng, began[-1] if began else None)
+            simulated = _simulated(machine, clean, noisier, rng, began[0] if began else None)
             seen = corrected_record(simulated, problem.unknowns, (x - drawn)[len(problem.parameters) :])
             again = validate(after.machine, Campaign(test, (seen,)), sensors=sensors, phases=own, jobs=jobs)
         except (RecordError, SimulationError):  # spools were not measured, or the run stops early

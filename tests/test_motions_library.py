@@ -115,6 +115,17 @@ def test_an_option_takes_its_quantity_in_any_unit(name, option, written, value):
     np.testing.assert_allclose(found.samples, same.samples, rtol=1e-12, atol=1e-15)  # rounding of the conversion
 
 
+@pytest.mark.parametrize("axis", ["roll", "pitch", "yaw"])
+def test_options_of_a_motion_about_an_axis_are_angles(axis):
+    turned = find_motion("sine", axis=axis, amplitude="0.5 deg")
+    np.testing.assert_allclose(turned.samples, find_motion("sine", axis=axis, amplitude=np.pi / 360).samples, rtol=1e-12)
+    rates = {"velocity": "20 deg/s", "corner_acceleration": "90 deg/s^2"}
+    assert find_motion("triangle", axis=axis, amplitude="10 deg", **rates).axes == (axis,)
+    for option, written, unit in (("amplitude", "5mm", "rad"), ("velocity", "20 mm/s", "rad/s")):
+        with pytest.raises(MotionError, match=f"option {option} is {written!r}; give .*, in {unit} or"):
+            find_motion("triangle", axis=axis, **{option: written})
+
+
 @pytest.mark.parametrize(
     ("name", "option", "written", "unit"),
     [

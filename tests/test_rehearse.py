@@ -197,6 +197,15 @@ def test_simulated_records_at_the_controllers_rate_are_held_and_all_others_inter
             assert np.array_equal(test.run.spool, record["spool_position"].values)
 
 
+def test_spools_in_per_cent_are_refused_with_the_channel_the_sample_and_the_likely_mistake(practice):
+    percent = practice.assign(spool_position=100.0 * practice["spool_position"])
+    peak = percent["spool_position"].isel(actuator=int(np.abs(percent["spool_position"]).max("time").argmax("actuator")))
+    sample = int(np.abs(peak.values).argmax())
+    said = rf"spool_position\[{peak.actuator.item()}\] reaches {np.abs(peak.values).max():.4g}: V or % .*sample {sample}"
+    with pytest.raises(RecordError, match=said):
+        replayed(percent)
+
+
 @pytest.mark.parametrize("steps", [1, 4])
 def test_interpolated_spools_are_the_signal_in_the_middle_of_each_step(practice, steps):
     """A sine of 31 Hz at 512 samples a second, between whose samples nothing was recorded."""

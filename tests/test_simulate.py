@@ -193,7 +193,7 @@ def test_run_that_leaves_a_stroke_stops_with_time_and_component_and_keeps_what_w
     with caplog.at_level(logging.WARNING):
         run = simulate(plant, OpenLoop(spool, rest.state), samples=len(spool), engine=engine)
     assert run.trouble is not None
-    assert "V" in run.trouble and "0.127" in run.trouble and "scale the motion down" in run.trouble
+    assert "V" in run.trouble and "0.127" in run.trouble and "in open loop" in run.trouble
     assert 100 < len(run.time) < len(spool)
     assert np.all(np.isfinite(run.q)) and np.all(np.isfinite(run.z))
     said = float(re.search(r"stopped at ([\d.]+) s", run.trouble).group(1))
@@ -312,9 +312,10 @@ def test_only_free_joints_of_a_specimen_need_the_per_step_engine(plant):
 # Effects and specimens -----------------------------------------------------------------------------------------------
 
 
-def test_only_a_replay_is_told_to_start_from_its_record(plant):
-    """A campaign or a rehearsal has no record whose pose it could start from."""
+def test_only_a_run_with_a_controller_is_told_to_scale_its_motion_down(plant):
+    """A replay has no motion that could be scaled, and starts from its record's pressures already."""
     closed, replayed = (
         diagnosis(plant, 1, 1.0, "semi_implicit", 8192, replayed=replayed) for replayed in (False, True)
     )
-    assert "record" not in closed and "the record's own pose" in replayed
+    assert "scale the motion down" in closed and "record" not in closed
+    assert "scale" not in replayed and "drifts from its record" in replayed

@@ -27,6 +27,7 @@ __all__ = [
     "residuals_of",
     "same_unit",
     "sensor_groups",
+    "unit_doubt",
 ]
 
 LAYOUT_VERSION = 1
@@ -235,6 +236,20 @@ def channel_unit(channel: str, units: str | None = None) -> str:
     variable, _, label = channel.rstrip("]").partition("[")
     parts = (LAYOUT[variable].units if units is None else units).split(",")
     return parts[-1 if label in AXES[3:] else 0].strip()
+
+
+_LIKELY_UNITS = {  # unit: least and greatest plausible peak, and the likely mistake outside
+    "m": (0.0, 3.0, "mm or in for m"),
+    "rad": (0.0, 1.0, "deg for rad"),
+    "Pa": (1e5, 2e8, "MPa, bar or psi for Pa"),
+    "1": (0.0, 1.2, "V or % for the share of full stroke"),
+}
+
+
+def unit_doubt(channel: str, peak: float) -> str:
+    """Likely mistake of unit of a column whose largest absolute value is `peak`, in words; empty if it is plausible."""
+    least, most, guess = _LIKELY_UNITS.get(channel_unit(channel), (0.0, math.inf, ""))
+    return "" if least <= peak <= most else f"reaches {peak:.4g}: {guess}?"
 
 
 def same_unit(units: object, wanted: str) -> bool:

@@ -19,7 +19,7 @@ from ..core.names import AXES
 from ..machine.machine import Machine
 from ..machine.recorded_changes import changes_summary
 from .alignment import hydraulic_force
-from .channels import LAYOUT, channel_name, channel_unit, columns_of
+from .channels import LAYOUT, channel_name, channel_unit, columns_of, unit_doubt
 from .conditioning import resolution
 from .force_units import wrong_forces
 from .layout_faults import RecordFinding, layout_faults
@@ -44,12 +44,6 @@ SPIKE_EXACT = 1e-3  # of that span, in a record without noise: kinks of friction
 RESOLUTION_STEPS = 8  # as many of a channel's smallest steps count as movement
 UNRELATED, FOLLOWS = 0.5, 0.95  # correlations of force and pressures: below, noise or another actuator's; the same
 MOVES = 0.5  # share of the largest variation of its kind from which a force must follow its pressures
-LIKELY_UNITS = {  # unit: least and greatest plausible peak, and the likely mistake outside
-    "m": (0.0, 3.0, "mm or in for m"),
-    "rad": (0.0, 1.0, "deg for rad"),
-    "Pa": (1e5, 2e8, "MPa, bar or psi for Pa"),
-    "1": (0.0, 1.2, "V or % for the share of full stroke"),
-}
 
 
 def check_record(path: Path | str, machine: Machine | None = None) -> list[RecordFinding]:
@@ -180,11 +174,9 @@ def _held(c: _Column, machine: Machine | None) -> bool:
 
 
 def _implausible_unit(c: _Column) -> _Warning | None:
-    least, most, guess = LIKELY_UNITS.get(channel_unit(c.channel), (0.0, np.inf, ""))
     size = np.abs(c.x)
-    if least <= size.max() <= most:
-        return None
-    return c.channel, int(size.argmax()), f"reaches {size.max():.4g}: {guess}?", "convert to SI"
+    doubt = unit_doubt(c.channel, float(size.max()))
+    return (c.channel, int(size.argmax()), doubt, "convert to SI") if doubt else None
 
 
 def _starts_in_motion(c: _Column) -> _Warning | None:

@@ -13,7 +13,7 @@ from ..core.files import models_folder
 from ..core.optional import INSTALL
 from .ac156 import ac156
 from .csv import load_csv
-from .motion import GroundMotion
+from .motion import AXES, GroundMotion
 from .motion_options import MotionOption, checked_options, options_of
 from .pulse_records import load_pulse_record, missing_package
 from .readers import MotionFiles, load_motion
@@ -71,6 +71,10 @@ class MotionEntry(NamedTuple):
             f"  then type:  {command}{order}",
         )
         return "\n".join(lines)
+
+
+_ROTATED = {"m": "rad", "m/s": "rad/s", "m/s^2": "rad/s^2"}
+"""Units of a motion's options where its axis is a rotation."""
 
 
 @cache
@@ -159,6 +163,8 @@ def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> Ground
     numbers = values_of(tests, entry.name)
     del numbers["kind"], numbers["title"]
     units = {option.name: option.unit for option in options_of(tests, entry.name)} if options else {}
+    if options.get("axis", numbers.get("axis")) in AXES[3:]:
+        units = {key: _ROTATED.get(unit, unit) for key, unit in units.items()}
     chosen = checked_options(name, numbers, units, options)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # GroundMotion refuses what becomes infinite

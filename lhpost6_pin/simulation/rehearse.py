@@ -1,7 +1,7 @@
 """Simulated tests of a machine: a motion rehearsed in closed loop, or a record's spools replayed in open loop."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -12,11 +12,11 @@ from ..control import ControllerSettings, make_controller
 from ..control.inverse import InverseFilter, apply_inverse
 from ..control.plug import UserController
 from ..core.arrays import Array
-from ..core.errors import SimulationError
+from ..core.errors import RecordError, SimulationError
 from ..core.names import SAMPLE_RATE
 from ..core.progress import Progress
 from ..core.shown import hint_of, plot_of, summary_of, text_of
-from ..data.channels import LAYOUT
+from ..data.channels import LAYOUT, unit_doubt
 from ..data.records import require
 from ..data.signals import resample_band_limited
 from ..data.valve_pairs import with_joint_spools
@@ -143,8 +143,8 @@ def replay(
     friction (n_states,) are the states of friction at the start, by default zero.
     Where two servovalves of an actuator were recorded apart, it follows their joint spool (`data.valve_pairs`). The
     spools of a simulated record at the controller's rate are held over each sample (as they were); those of any
-    other are interpolated, band-limited, to the model steps. Raises RecordError naming missing channels, or the
-    specimen of the record if the machine has none.
+    other are interpolated, band-limited, to the model steps. Raises RecordError naming missing channels, a spool that
+    is no share of its stroke, or the specimen of the record if the machine has none.
     """
     require(record, "spool_position", "chamber_pressure_a")
     machine = machine.as_tested(record.attrs, "the record")
@@ -155,6 +155,7 @@ def replay(
     recorded = (
         with_joint_spools(machine, record)["spool_position"].sel(actuator=names).transpose("time", "actuator").values
     )
+    _refuse_wrong_unit(names, recorded, record)
     rate = (len(recorded) - 1) / float(record["time"][-1] - record["time"][0])
     steps = options.get("steps_per_second", 4 * SAMPLE_RATE)
     held = record.attrs.get("kind") == "simulated" and abs(rate - SAMPLE_RATE) < 1e-6 * SAMPLE_RATE
@@ -170,6 +171,17 @@ def replay(
     )
     run = with_pressure_trouble(_usable(run))
     return SimulatedTest(run, record_of_run(run, {"spool_interpolation": "held" if held else "band-limited", **attrs}))
+
+
+def _refuse_wrong_unit(names: Sequence[str], spools: Array, record: xr.Dataset) -> None:
+    """Raise RecordError for recorded spools (n, n_actuators) that are no shares of full stroke."""
+    peaks = np.abs(spools).max(axis=0)
+    worst = int(np.argmax(np.where(np.isfinite(peaks), peaks, 0.0)))
+    channel, peak = f"spool_position[{names[worst]}]", float(peaks[worst])
+    if doubt := unit_doubt(channel, peak):
+        sample = int(np.abs(spools[:, worst]).argmax())
+        file = f"{source}: " if (source := record.encoding.get("source")) else ""
+        raise RecordError(f"{file}{channel} {doubt} (sample {sample}); convert to the share of full stroke, -1 to 1")
 
 
 def _usable(run: Run) -> Run:

@@ -133,8 +133,8 @@ def simulate(
     if trouble:
         log.warning("%s%s", named, trouble)
     if clipped:
-        what = "spool values beyond full stroke were clipped to it: the motion needs more flow"
-        log.warning("%s%d %s", named, clipped, what)
+        why = ": the motion needs more flow" if closed else ""
+        log.warning("%s%d spool values beyond full stroke were clipped to it%s", named, clipped, why)
     motion = {name: values[:kept] for name, values in log_._asdict().items()}
     if exchanged is not None:
         exchanged = exchanged.every(record_every, kept)
@@ -295,7 +295,7 @@ def _run_fused(job: _Job) -> tuple[int, int, int]:
     return 0, samples, clipped
 
 
-_REPLAYED = "scale the motion down, or start from the record's own pose and pressures"
+_REPLAYED = "in open loop a model drifts from its record; compare what is before that"
 
 
 def diagnosis(plant: Plant, status: int, time: float, scheme: str, rate: int, *, replayed: bool = False) -> str:

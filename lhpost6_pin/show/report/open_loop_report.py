@@ -97,9 +97,10 @@ def comparison_table(compared: Sequence[Compared]) -> Table:
 
 
 def _verdict(simulated: xr.Dataset, compared: Sequence[Compared]) -> tuple[str, Level]:
-    trouble = str(simulated.attrs.get("trouble", "none"))
+    trouble, count = str(simulated.attrs.get("trouble", "none")), simulated.attrs.get("spool_values_clipped", 0)
+    clipped = f" {count} recorded spool values beyond full stroke were clipped to it." if count else ""
     if trouble != "none":
-        return f"The replay {trouble.partition(';')[0]}. See the notes.", "bad"
+        return f"The replay {trouble.partition(';')[0]}.{clipped} See the notes.", "bad"
     if not compared:
         return "Nothing is compared: the record has none of the channels that a model gives.", "plain"
     named = (("platen_displacement", "displacement"), ("actuator_force", "actuator force"))
@@ -110,7 +111,7 @@ def _verdict(simulated: xr.Dataset, compared: Sequence[Compared]) -> tuple[str, 
     of = _of_moving(compared)
     of = f"; displacement {of}" if of and worst[0][1] is not None else ""
     return (
-        f"Driven by the recorded spools, the model differs by an RRMSE of {' and '.join(words)} at most{of}.",
+        f"Driven by the recorded spools, the model differs by an RRMSE of {' and '.join(words)} at most{of}.{clipped}",
         "plain",
     )
 

@@ -644,6 +644,18 @@ def test_samples_are_counted_that_are_missed_or_come_late():
 
 
 @pytest.mark.fast
+def test_a_plant_that_waits_for_its_first_command_is_not_late():
+    rows = Rows(10, 3)
+    table = np.zeros((3001, rows.width))
+    table[1:, 0], table[1:, 1] = np.arange(3000), PlantState.RUNNING
+    table[1:, rows.places["stamp"]] = (5.0 + np.arange(3000) / SAMPLE_RATE)[:, None]  # [s] after high pressure
+    found = Timekeeping(rows, 1.0)
+    for part in np.array_split(table, 37):
+        found.add(part)
+    assert (found.missed, found.late) == (0, 0)
+
+
+@pytest.mark.fast
 def test_moves_at_rest_stay():
     assert np.array_equal(at_rest(np.array([1.0, 2.0]), 5.0).at(np.array([0.0, 5.0, 9.0])).value, [[1.0, 2.0]] * 3)
 

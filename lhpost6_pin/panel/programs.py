@@ -15,6 +15,7 @@ __all__ = ["WAVES", "Program", "Recorded", "Wave", "make_wave"]
 
 WAVES = ("sine", "triangle", "sweep")
 """Waves of the function generator."""
+_AT_ONCE = 1024  # times whose harmonics are evaluated together: a triangle may have hundreds
 
 
 class Program(Protocol):
@@ -65,11 +66,13 @@ class Wave:
             speed = np.full(len(time), 2.0 * np.pi * self.frequency)
             phase, growth = speed * time, np.zeros(len(time))
         value, rate, acceleration = np.zeros((3, len(time)))
-        for order, amplitude in self.harmonics:
-            sine, cosine = np.sin(order * phase), np.cos(order * phase)
-            value += amplitude * sine
-            rate += amplitude * order * speed * cosine
-            acceleration += amplitude * order * (growth * cosine - order * speed**2 * sine)
+        order, amplitude = np.array(self.harmonics).T
+        for part in (slice(k, k + _AT_ONCE) for k in range(0, len(time), _AT_ONCE)):
+            angle = np.outer(phase[part], order)
+            sine, cosine = np.sin(angle), np.cos(angle)
+            slope = cosine @ (amplitude * order)
+            value[part], rate[part] = sine @ amplitude, speed[part] * slope
+            acceleration[part] = growth[part] * slope - speed[part] ** 2 * (sine @ (amplitude * order**2))
         moved = np.zeros((3, len(time), 6))
         moved[:, :, list(self.axes)] = np.stack([value, rate, acceleration])[:, :, None]
         return Moved(*moved)

@@ -29,7 +29,10 @@ class Timekeeping:
         return (self.missed + self.late) / max(self.answered + self.missed, 1)
 
     def add(self, rows: Array) -> None:
-        """Take the next rows (n, width)."""
+        """Take the next rows (n, width); those of a plant that waits for its first command are of no clock yet."""
+        rows = rows[rows[:, 1] != PlantState.WAITING]
+        if not len(rows):
+            return
         samples = rows[:, 0].astype(int)
         goes_on = samples[0] > self._newest >= 0
         steps = np.diff(samples, prepend=self._newest if goes_on else samples[0])

@@ -120,18 +120,23 @@ def full(plant):
     return start
 
 
+def moved(plant, test, start):
+    """The test with the forces of one that began with states (n_states,) of its own; its residual wrench (n, 6) without."""
+    rest = evaluate_residuals(plant, test, ("wrench",)).wrench
+    more = evaluate_residuals(plant, test, ("wrench",), path=follow(plant, test, start=start)).wrench - rest
+    arms = leg_wrenches(plant, plant_motion(plant, test.motion).q, np.ones((test.samples, plant.spools)))
+    force = test.channels["actuator_force"] + np.einsum("ni,nik->nk", more, np.linalg.pinv(arms))
+    return replace(test, channels=test.channels | {"actuator_force": force}), rest
+
+
 @pytest.mark.parametrize("held", [lambda plant: drawn(plant, 0.8), full], ids=["part", "full"])
 def test_the_balance_of_forces_shows_what_is_held_at_the_start(base, held):
     """Forces of a test that began with states of its own, from the motion and forces of one that did not.
 
     From full friction on the force is no linear function of the state: what remains is within a twentieth of the noise.
     """
-    plant, test, start = base.plant, base.tests[0], held(base.plant)
-    rest = evaluate_residuals(plant, test, ("wrench",)).wrench
-    more = evaluate_residuals(plant, test, ("wrench",), path=follow(plant, test, start=start)).wrench - rest
-    arms = leg_wrenches(plant, plant_motion(plant, test.motion).q, np.ones((test.samples, plant.spools)))
-    force = test.channels["actuator_force"] + np.einsum("ni,nik->nk", more, np.linalg.pinv(arms))
-    began = replace(test, channels=test.channels | {"actuator_force": force})
+    plant, test = base.plant, base.tests[0]
+    began, rest = moved(plant, test, held(plant))
     found = estimate_start(plant, began, 30.0)
     after = evaluate_residuals(plant, began, ("wrench",), path=follow(plant, began, start=found)).wrench
     before = evaluate_residuals(plant, began, ("wrench",)).wrench
@@ -240,3 +245,20 @@ def test_validate_uses_a_recording_up_to_its_trip_and_states_it(run, caplog):
     (phase,) = found.phases
     assert phase.notes[0].startswith("tripped at 9.000 s") and len(phase.time) == 9 * SAMPLE_RATE
     assert max(a.rrmse_aligned for a in phase.of("wrench") if a.moves) < EXACT
+
+
+def test_pads_near_their_full_friction_in_both_directions_are_found(base):
+    """Full friction of a pad is a circle in its plane: each direction has what the other leaves.
+
+    Held by a motion before along x and y at once, as after a sweep of both; what remains is within a twentieth of the noise.
+    """
+    plant, test, start = base.plant, base.tests[0], np.zeros(len(base.plant.states))
+    for row in plant.rows:
+        if law_of(row).friction_memory:
+            own = states_of(row)
+            start[own] = [0.74, 0.67] if own.stop - own.start == 2 else 0.0
+    began, rest = moved(plant, test, start)
+    found = estimate_start(plant, began, 30.0)
+    after = evaluate_residuals(plant, began, ("wrench",), path=follow(plant, began, start=found)).wrench
+    assert largest_share(plant, found) <= 1.0 + 1e-12  # rounding
+    assert np.all(after[:, plant.axes].std(axis=0) < 1.05 * rest[:, plant.axes].std(axis=0))

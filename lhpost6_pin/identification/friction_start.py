@@ -5,6 +5,8 @@ along one slip differ by an amount that decays with the travel. Well below full 
 state, near it is not: the balance is linearised about each estimate.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,6 +27,9 @@ __all__ = ["estimate_start", "largest_share", "start_deviation", "start_wrenches
 APART, NEAR = 0.5, 1e-3
 """Change of a state, of full friction, either way, by which that of the wrench is taken; and so without noise, where
 friction near its full force, strongly curved there, has to be exact."""
+
+LEAST_ROOM = 1e-4
+"""Square of what a state may vary where the others of its pad hold all friction: its slope is taken across that."""
 
 ROUNDS, MOST_ROUNDS, SETTLED = 4, 20, 1e-6
 """Linearisations: on a triangle whose seals and pads held all of their friction, what the third one left of its wrench
@@ -65,7 +70,8 @@ def start_wrenches(
         sides, states = [], []
         for step in (apart, -apart):
             state = middle.copy()
-            state[own] = np.clip(state[own] + step, -1.0, 1.0)
+            room = _room(middle, own, [states_of(row) for row in some])
+            state[own] = np.clip(state[own] + step, -room, room)
             began = follow(plant, test, known, start=state)
             z = with_loads(plant, began.ports, began.required, began.z, force)
             sides.append(row_wrenches(plant, began.ports, z, some))
@@ -140,10 +146,11 @@ class _Balance:
         """Most probable states (n_states,), linearised about others that leave `rest` (n, a): see `_fitted`."""
         wrenches, places = start_wrenches(self.plant, self.test, self.path, about=state, apart=apart)
         slopes, out = self._compared(wrenches), state.copy()
-        out[places] = _fitted(rest + slopes @ state[places], slopes, state[places], self.deviation, least, white)
-        for row in _friction_rows(self.plant):
-            own = out[states_of(row)]
-            own /= max(float(np.linalg.norm(own)), 1.0)  # no more than full friction
+        full = [np.isin(places, np.r_[states_of(row)]) for row in _friction_rows(self.plant)]
+        wanted = rest + slopes @ state[places]
+        out[places] = _fitted(wanted, slopes, state[places], self.deviation, least, white, full)
+        for row in _friction_rows(self.plant):  # but for rounding they are within full friction
+            out[states_of(row)] /= max(float(np.linalg.norm(out[states_of(row)])), 1.0)
         return out
 
     def _compared(self, x: Array) -> Array:
@@ -152,14 +159,15 @@ class _Balance:
         return np.asarray(means - means.mean(axis=0))[:, self.plant.axes]
 
 
-def _fitted(rest: Array, slopes: Array, found: Array, deviation: float, least: Array, white: bool) -> Array:
+def _fitted(
+    rest: Array, slopes: Array, found: Array, deviation: float, least: Array, white: bool, full: Sequence[NDArray[np.bool_]]
+) -> Array:
     """Most probable states (k,) by what the balance (n, a) leaves without them, and its slopes (n, a, k).
 
     Each has this prior deviation, and the error at least `least` (a,). It is first that which the states `found` leave;
-    `white`, without correlation, as long as the states that are to explain the balance would be its own.
+    `white`, without correlation, as long as the states that are to explain the balance would be its own. full: the
+    states of each seal and pad, whose norm is at most one.
     """
-    from scipy.optimize import lsq_linear
-
     count = len(found)
     prior = np.eye(count, count + 1) / deviation
     for nth in range(WEIGHINGS):
@@ -169,10 +177,29 @@ def _fitted(rest: Array, slopes: Array, found: Array, deviation: float, least: A
         error = np.sqrt(np.mean(_new(left, share) ** 2, axis=0)) + least
         rows = (_new(slopes, share[:, None]) / error[:, None]).reshape(-1, count)
         wanted = (_new(rest, share) / error).reshape(-1, 1)
-        whole = np.vstack([np.hstack([rows, wanted]), prior])
-        small = np.asarray(np.linalg.qr(whole, mode="r"))  # the same in few rows
-        found = lsq_linear(small[:, :-1], small[:, -1], (-1.0, 1.0), method="bvls").x
+        small = np.asarray(np.linalg.qr(np.vstack([np.hstack([rows, wanted]), prior]), mode="r"))  # the same in few rows
+        found = _within(small[:, :-1], small[:, -1], found, full)
     return found
+
+
+def _within(slopes: Array, wanted: Array, start: Array, full: Sequence[NDArray[np.bool_]]) -> Array:
+    """States (k,) of the least squares of slopes (m, k) times them less `wanted` (m,), each seal and pad within one."""
+    from scipy.optimize import minimize
+
+    masks = np.array(full, dtype=float)
+    free = np.linalg.lstsq(slopes, wanted)[0]
+    if np.all(masks @ free**2 <= 1.0):
+        return np.asarray(free)
+    size = float(wanted @ wanted)
+    found = minimize(
+        lambda x: 0.5 * np.sum((slopes @ x - wanted) ** 2) / size,
+        start,
+        jac=lambda x: slopes.T @ (slopes @ x - wanted) / size,
+        method="SLSQP",
+        constraints={"type": "ineq", "fun": lambda x: 1.0 - masks @ x**2, "jac": lambda x: -2.0 * masks * x},
+        options={"maxiter": 300, "ftol": 1e-15},
+    )
+    return np.asarray(found.x)
 
 
 def largest_share(plant: Plant, start: Array) -> float:
@@ -183,6 +210,12 @@ def largest_share(plant: Plant, start: Array) -> float:
 def _number(path: str) -> float:
     """Number of `models/procedures/decompose.toml`."""
     return load_parameters(models_folder() / "procedures" / "decompose.toml").number(path)
+
+
+def _room(state: Array, own: Sequence[int], members: Sequence[slice]) -> Array:
+    """How far each of the states `own` can go with the others of its seal or pad, `members`, at full friction."""
+    others = [np.sum(state[all_of] ** 2) - state[one] ** 2 for one, all_of in zip(own, members, strict=True)]
+    return np.sqrt(np.maximum(1.0 - np.array(others), LEAST_ROOM))
 
 
 def _friction_rows(plant: Plant) -> NDArray[np.void]:

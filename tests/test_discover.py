@@ -1022,7 +1022,7 @@ def test_a_record_is_corrected_as_a_test_is(ready, rubbing):
 
 
 def test_a_record_has_the_same_hash_in_memory_and_read_from_a_file(rubbing, tmp_path):
-    """Names are objects in memory, and of fixed width in a file; a search that begins with one resumes with the other."""
+    """Names are objects in memory, of fixed width in a file; a search that begins with one resumes with the other."""
     record = rubbing.records[0]
     (path, *_) = save_campaign(rubbing, tmp_path)
     again = load_record(path)

@@ -118,7 +118,9 @@ def test_an_option_takes_its_quantity_in_any_unit(name, option, written, value):
 @pytest.mark.parametrize("axis", ["roll", "pitch", "yaw"])
 def test_options_of_a_motion_about_an_axis_are_angles(axis):
     turned = find_motion("sine", axis=axis, amplitude="0.5 deg")
-    np.testing.assert_allclose(turned.samples, find_motion("sine", axis=axis, amplitude=np.pi / 360).samples, rtol=1e-12)
+    np.testing.assert_allclose(
+        turned.samples, find_motion("sine", axis=axis, amplitude=np.pi / 360).samples, rtol=1e-12
+    )
     rates = {"velocity": "20 deg/s", "corner_acceleration": "90 deg/s^2"}
     assert find_motion("triangle", axis=axis, amplitude="10 deg", **rates).axes == (axis,)
     for option, written, unit in (("amplitude", "5mm", "rad"), ("velocity", "20 mm/s", "rad/s")):

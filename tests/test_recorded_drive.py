@@ -96,7 +96,10 @@ def test_a_replay_is_judged_by_the_axes_that_its_test_moves(tmp_path):
     verdict, _ = write_open_loop_report(measured, simulated, compared, tmp_path / "report.html")
     assert "displacement 1.00\N{NO-BREAK SPACE}% (x) at most; displacement of the axes that move (x)." in verdict
     clipped = simulated.assign_attrs(spool_values_clipped=7)
-    for shown, word in ((clipped, "at most"), (clipped.assign_attrs(trouble="stopped at 2 s: V6"), "The replay stopped")):
+    for shown, word in (
+        (clipped, "at most"),
+        (clipped.assign_attrs(trouble="stopped at 2 s: V6"), "The replay stopped"),
+    ):
         verdict, _ = write_open_loop_report(measured, shown, compared, tmp_path / "clipped.html")
         assert word in verdict and "7 recorded spool values beyond full stroke were clipped" in verdict
     page = (tmp_path / "report.html").read_text()

@@ -199,9 +199,13 @@ def test_simulated_records_at_the_controllers_rate_are_held_and_all_others_inter
 
 def test_spools_in_per_cent_are_refused_with_the_channel_the_sample_and_the_likely_mistake(practice):
     percent = practice.assign(spool_position=100.0 * practice["spool_position"])
-    peak = percent["spool_position"].isel(actuator=int(np.abs(percent["spool_position"]).max("time").argmax("actuator")))
+    peak = percent["spool_position"].isel(
+        actuator=int(np.abs(percent["spool_position"]).max("time").argmax("actuator"))
+    )
     sample = int(np.abs(peak.values).argmax())
-    said = rf"spool_position\[{peak.actuator.item()}\] reaches {np.abs(peak.values).max():.4g}: V or % .*sample {sample}"
+    said = (
+        rf"spool_position\[{peak.actuator.item()}\] reaches {np.abs(peak.values).max():.4g}: V or % .*sample {sample}"
+    )
     with pytest.raises(RecordError, match=said):
         replayed(percent)
 

@@ -13,10 +13,15 @@ from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import OutOfRangeError, SimulationError, UnknownNameError
 from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.core.rounding import rounded_down
+from lhpost6_pin.data.alignment import due_spools
 from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import load_sensors
+from lhpost6_pin.data.signals import Band
 from lhpost6_pin.machine.machine import load_machine
+from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation import simulated_campaign as module
+from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.simulation.simulated_campaign import check_campaign, simulate_campaign
 
 
@@ -155,3 +160,16 @@ def test_a_spool_held_over_each_sample_is_recorded_at_the_instants_of_the_sample
     means = np.diff(-np.cos(omega * edges)) * 2048.0 / omega
     found = module._at_instants(means[:, None])[2:-1, 0]
     np.testing.assert_allclose(found, np.sin(omega * edges[2:-2]), atol=1.1 * (omega / 2048.0) ** 4 / 30.0)
+
+
+def test_spools_of_the_machine_itself_follow_their_recorded_commands_to_within_noise():
+    """Both at the instants of the samples: of a sine of 5 Hz, half a controller sample between them is beyond noise."""
+    sensors = load_sensors()
+    target = make_target(find_motion("sine", amplitude=0.01, period=0.2, cycles=20.0), rate=float(SAMPLE_RATE))
+    run = rehearse(load_machine(), target, load_controller("lhpost6"), attrs={}, engine="fused").record
+    record = module.as_sensed(run, sensors, module.SensorErrors({}, {}, {}), 512.0, np.random.default_rng(0))
+    command, spool = record["spool_command"].values, record["spool_position"].values
+    rest = Band(high=33.0).apply(spool - due_spools(make_plant(load_machine()), command, 1.0 / 512.0), 1.0 / 512.0)
+    noise = sensors.noise["spool_position"] * np.sqrt(33.0 / (0.5 * SAMPLE_RATE))  # white up to half the run's rate
+    assert np.abs(np.diff(spool[:, 0])).max() > 5e-3
+    assert np.all(rest[100:-100].std(axis=0) < 1.15 * noise)  # of some 400 independent values: three deviations

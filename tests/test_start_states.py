@@ -121,7 +121,7 @@ def full(plant):
 
 
 def moved(plant, test, start):
-    """The test with the forces of one that began with states (n_states,) of its own; its residual wrench (n, 6) without."""
+    """The test with the forces of one that began with states (n_states,) of its own; residual wrench (n, 6) without."""
     rest = evaluate_residuals(plant, test, ("wrench",)).wrench
     more = evaluate_residuals(plant, test, ("wrench",), path=follow(plant, test, start=start)).wrench - rest
     arms = leg_wrenches(plant, plant_motion(plant, test.motion).q, np.ones((test.samples, plant.spools)))
@@ -250,7 +250,7 @@ def test_validate_uses_a_recording_up_to_its_trip_and_states_it(run, caplog):
 def test_pads_near_their_full_friction_in_both_directions_are_found(base):
     """Full friction of a pad is a circle in its plane: each direction has what the other leaves.
 
-    Held by a motion before along x and y at once, as after a sweep of both; what remains is within a twentieth of the noise.
+    Held by a motion before along x and y at once, as after a sweep of both; what remains is noise within a twentieth.
     """
     plant, test, start = base.plant, base.tests[0], np.zeros(len(base.plant.states))
     for row in plant.rows:

@@ -50,7 +50,7 @@ class Channel:
     companions: tuple[str, ...] = ()  # channels without which it serves no residual
     replaces: str = ""  # channel whose place in the wrench it takes where that was not measured
     same_as: str = ""  # channel that measures the same quantity, if this one is redundant
-    held: bool = False  # follows a command that is held: each column may be late by part of a controller sample
+    held: bool = False  # held over a controller sample, or follows what is: a column may be late by part of one
     differentiated: bool = False  # residuals use its rate, too
 
 
@@ -117,6 +117,7 @@ LAYOUT: Mapping[str, Channel] = {
         errors=("delay",),
         residuals=("servo",),
         companions=("spool_position",),
+        held=True,
     ),
     "spool_position": Channel(
         dims=_ACTUATOR,

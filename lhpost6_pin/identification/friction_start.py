@@ -160,7 +160,13 @@ class _Balance:
 
 
 def _fitted(
-    rest: Array, slopes: Array, found: Array, deviation: float, least: Array, white: bool, full: Sequence[NDArray[np.bool_]]
+    rest: Array,
+    slopes: Array,
+    found: Array,
+    deviation: float,
+    least: Array,
+    white: bool,
+    full: Sequence[NDArray[np.bool_]],
 ) -> Array:
     """Most probable states (k,) by what the balance (n, a) leaves without them, and its slopes (n, a, k).
 
@@ -177,7 +183,8 @@ def _fitted(
         error = np.sqrt(np.mean(_new(left, share) ** 2, axis=0)) + least
         rows = (_new(slopes, share[:, None]) / error[:, None]).reshape(-1, count)
         wanted = (_new(rest, share) / error).reshape(-1, 1)
-        small = np.asarray(np.linalg.qr(np.vstack([np.hstack([rows, wanted]), prior]), mode="r"))  # the same in few rows
+        whole = np.vstack([np.hstack([rows, wanted]), prior])
+        small = np.asarray(np.linalg.qr(whole, mode="r"))  # the same in few rows
         found = _within(small[:, :-1], small[:, -1], found, full)
     return found
 

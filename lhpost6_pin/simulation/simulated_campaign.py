@@ -234,8 +234,8 @@ def as_sensed(
 ) -> xr.Dataset:
     """A run's record through sensors: skewed, low-passed, sampled at `rate` [Hz], scaled, offset, noisy.
 
-    The spool, in a run the mean over the following sample, is first interpolated to the instant of the sample. Hidden
-    states and specimen joints are omitted; the errors become attributes (`true_gain_...`).
+    Spools and their commands, in a run the mean over the following sample, are first interpolated to the instant of
+    the sample. Hidden states and specimen joints are omitted; the errors become attributes (`true_gain_...`).
     """
     dt = float(record["time"][1] - record["time"][0])
     every = round(1.0 / (rate * dt))

@@ -1,13 +1,19 @@
 """Alignment: known skews are found from sensors that measure the same thing twice, and taken out."""
 
+import warnings
+from pathlib import Path
+
 import numpy as np
 import pytest
 from sensor_cases import RATE, measured, waves
 
 from lhpost6_pin.data.alignment import Delay, align_record, combine_delays, group_delays, phase_delay, slow_delay
+from lhpost6_pin.data.campaign_check import check_campaign
 from lhpost6_pin.data.channels import sensor_groups
+from lhpost6_pin.data.records import load_record
 from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.data.signals import align, differentiate
+from lhpost6_pin.machine.machine import load_machine
 
 DT = 1 / RATE
 T = np.arange(round(20 * RATE)) * DT
@@ -95,3 +101,13 @@ def test_groups_without_a_twin_are_left_out_and_a_delay_can_be_given_by_hand(pla
     inside = slice(50, -50)
     scale = np.abs(differentiate(motion.acceleration, DT)[inside]).max(axis=0)  # of Taylor's next term
     assert (np.abs(aligned["platen_velocity"].values - shifted)[inside] < 1e-6 * scale).all()
+
+
+@pytest.mark.parametrize("factor", [20.0, 1e3, 2e5])
+def test_a_displacement_in_a_wrong_unit_leaves_struts_without_length_and_is_no_crash(factor):
+    record = load_record(Path(__file__).parent / "data" / "records" / "practice_a_TX.nc")
+    record["platen_displacement"] = record["platen_displacement"] * factor
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = check_campaign(load_machine("lhpost6"), [record])
+    assert found is not None

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import RecordError
@@ -17,6 +18,7 @@ from lhpost6_pin.identification.calibration import calibration_numbers
 from lhpost6_pin.identification.calibration.operating_point import OperatingPoint
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
 from lhpost6_pin.identification.calibration.start_states import no_start_states, start_states
+from lhpost6_pin.identification.decompose.agreement import find_agreement
 from lhpost6_pin.identification.decompose.record import decompose_record
 from lhpost6_pin.identification.friction_start import estimate_start, largest_share, start_wrenches
 from lhpost6_pin.identification.inverse_dynamics import leg_wrenches
@@ -29,6 +31,7 @@ from lhpost6_pin.mechanics.pose import plant_motion
 from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.show.report.decompose_report import EXACT
 from lhpost6_pin.simulation.rehearse import rehearse
+from lhpost6_pin.simulation.simulated_campaign import SensorErrors, as_sensed, simulate_campaign
 
 RECORDS = Path(__file__).parent / "data" / "records"
 
@@ -262,3 +265,25 @@ def test_pads_near_their_full_friction_in_both_directions_are_found(base):
     after = evaluate_residuals(plant, began, ("wrench",), path=follow(plant, began, start=found)).wrench
     assert largest_share(plant, found) <= 1.0 + 1e-12  # rounding
     assert np.all(after[:, plant.axes].std(axis=0) < 1.05 * rest[:, plant.axes].std(axis=0))
+
+
+# ------------------------------------------------------------------------------------------------ records with noise
+def test_offsets_of_load_cells_are_not_called_held_friction():
+    """In a test along z, pads never travel along x or y: a state there is a force that stays, as an offset is."""
+    machine, sensors = load_machine(), load_sensors()
+    (record,) = simulate_campaign(machine, load_controller("lhpost6"), sensors, seed=2, tests=("TZ",)).records
+    found = decompose_record(machine, record)
+    mean = found.forces.residual.mean(axis=0)
+    assert np.all(np.abs(mean[:2]) < 3.0 * np.array([3.6e3, 2.9e3]))  # [N] deviations by offsets within their ranges
+
+
+def test_a_long_rest_after_a_motion_does_not_raise_the_predicted_noise(run):
+    """A second draw of noise moves the platen at rest more than one does: friction would creep away in it."""
+    still = run.isel(time=[-1] * (40 * SAMPLE_RATE))
+    whole = xr.concat([run, still], dim="time", data_vars="minimal")
+    whole = whole.assign_coords(time=np.arange(whole.sizes["time"]) / SAMPLE_RATE)
+    rng, exact = np.random.default_rng(5), SensorErrors({}, {}, {})  # not the noise that is drawn again
+    record = as_sensed(whole, load_sensors(), exact, 512.0, rng).assign_attrs(kind="measured")
+    found = decompose_record(load_machine(), record)
+    ratio = find_agreement(found).noise_ratio
+    assert np.all((ratio > 0.8) & (ratio < 1.25))

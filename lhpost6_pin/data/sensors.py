@@ -6,7 +6,7 @@ the new rate. Recording with a step q adds 2 (q^2 / 12) / rate, white at the rec
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +67,10 @@ class SensorSet:
         """Standard deviation (1,) or (6,) of the noise below a sharp `cutoff` [Hz], by default of all recorded."""
         f = np.linspace(0.0, min(cutoff, self.rate / 2), 4097)
         return np.sqrt(np.trapezoid(self.noise_spectrum(channel, f), f, axis=0))
+
+    def drawn_twice(self) -> "SensorSet":
+        """Sensors of measured records to which `add_noise` has added as much again: a platen at rest moves more."""
+        return replace(self, noise={channel: np.sqrt(2.0) * sd for channel, sd in self.noise.items()})
 
     def gain_sd(self, channel: str) -> float:
         """Standard deviation of a channel's gain [1]."""

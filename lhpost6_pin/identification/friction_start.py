@@ -6,6 +6,7 @@ state, near it is not: the balance is linearised about each estimate.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,10 +87,11 @@ def estimate_start(plant: Plant, test: MeasuredTest, cutoff: float) -> Array:
 
     The most probable ones, at most full friction, with the prior of `start_deviation` and an error of the balance that
     is, on each axis, as large as what remains of it, and as correlated from sample to sample (an autoregression of
-    first order, after Cochrane and Orcutt, 1949): the balance is linearised anew about each estimate. Means over the
-    test count for nothing: a force that stays may be the offset of a sensor. Zero where forces are not measured; and in
-    a simulated test unless states lower the squares of its residual by `friction.held_gain` of `decompose.toml`: else
-    it is not the start that the balance lacks.
+    first order, after Cochrane and Orcutt, 1949): the balance is linearised anew about each estimate. A force that
+    stays may be the offset of a sensor: means over the test count by their own size without states, and that of what
+    varies, so that states bring in no larger ones. Zero where forces are not measured; and in a simulated test unless
+    states lower the squares of its residual by `friction.held_gain` of `decompose.toml`: else it is not the start that
+    the balance lacks.
     """
     state, block = np.zeros(len(plant.states)), max(round(0.5 / (cutoff * test.dt)), 1)
     force = actuator_forces(plant.machine, test.channels)
@@ -99,11 +101,13 @@ def estimate_start(plant: Plant, test: MeasuredTest, cutoff: float) -> Array:
         measured = leg_wrenches(plant, plant_motion(plant, test.motion).q, force).sum(axis=1)[:, plant.axes]
         return _without_noise(_Balance(plant, test, 1), np.std(measured, axis=0))
     balance, none = _Balance(plant, test, block), np.zeros(len(plant.axes))
+    stays = np.abs(balance.left(state).mean)
     for nth in range(ROUNDS):
         rest = balance.left(state)
-        if not rest.any(axis=0).all():  # without any error: nothing is to be explained
+        if not rest.varying.any(axis=0).all():  # without any error: nothing is to be explained
             break
-        state = balance.fitted(state, rest, none, white=nth == 0)
+        spread = stays + rest.varying.std(axis=0)
+        state = balance.fitted(state, rest, none, white=nth == 0, spread=spread)
     return state
 
 
@@ -113,7 +117,8 @@ def _without_noise(balance: "_Balance", measured: Array) -> Array:
     The prior decides between states that the balance does not distinguish.
     """
     zero = state = np.zeros(len(balance.plant.states))
-    first = rest = balance.left(zero)
+    start = balance.left(zero)
+    first = rest = start.varying
     least = BALANCED * np.maximum(measured, SHOWN * measured.max())
     if np.all(np.mean(first**2, axis=0) <= least**2):
         return zero
@@ -123,59 +128,80 @@ def _without_noise(balance: "_Balance", measured: Array) -> Array:
         return bool(by * np.sum((rest / least) ** 2) <= np.sum((first / least) ** 2))
 
     for nth in range(MOST_ROUNDS):
-        last, state = state, balance.fitted(state, rest, least, apart=NEAR if nth else APART, white=nth == 0)
-        rest = balance.left(state)
+        last, state = state, balance.fitted(state, start, least, apart=NEAR if nth else APART, white=nth == 0)
+        start = balance.left(state)
+        rest = start.varying
         if np.abs(state - last).max() < SETTLED or (nth + 1 == ROUNDS and not lowered(2.0)):
             break
     return state if lowered(_number("friction.held_gain")) else zero
 
 
+class _Left(NamedTuple):
+    """What the balance of a test's forces leaves on the free axes."""
+
+    varying: Array  # (n, a) in means over blocks of samples, less their mean
+    mean: Array  # (a,)
+
+
 class _Balance:
-    """What the balance of a test's forces leaves on the free axes, in means over blocks of samples, less its mean."""
+    """The balance of a test's forces from states at its start on."""
 
     def __init__(self, plant: Plant, test: MeasuredTest, block: int) -> None:
         self.plant, self.test, self.block = plant, test, block
         self.path, self.deviation = follow(plant, test), start_deviation()
 
-    def left(self, state: Array) -> Array:
-        """It (n, a) from states (n_states,) at the start on."""
+    def left(self, state: Array) -> _Left:
+        """What it leaves from states (n_states,) at the start on."""
         path = follow(self.plant, self.test, (self.plant, self.path), start=state) if state.any() else self.path
         return self._compared(evaluate_residuals(self.plant, self.test, ("wrench",), path=path).wrench)
 
-    def fitted(self, state: Array, rest: Array, least: Array, *, white: bool, apart: float = APART) -> Array:
-        """Most probable states (n_states,), linearised about others that leave `rest` (n, a): see `_fitted`."""
+    def fitted(
+        self,
+        state: Array,
+        rest: _Left,
+        least: Array,
+        *,
+        white: bool,
+        apart: float = APART,
+        spread: Array | float = np.inf,
+    ) -> Array:
+        """Most probable states (n_states,), linearised about others that leave `rest`: see `_fitted`.
+
+        spread (a,): deviation of the mean; infinite: it counts for nothing.
+        """
         wrenches, places = start_wrenches(self.plant, self.test, self.path, about=state, apart=apart)
-        slopes, out = self._compared(wrenches), state.copy()
+        (slopes, levels), out, about = self._compared(wrenches), state.copy(), state[places]
         full = [np.isin(places, np.r_[states_of(row)]) for row in _friction_rows(self.plant)]
-        wanted = rest + slopes @ state[places]
-        out[places] = _fitted(wanted, slopes, state[places], self.deviation, least, white, full)
+        known = np.column_stack([levels, rest.mean + levels @ about]) / np.reshape(spread, (-1, 1))
+        prior = np.vstack([np.eye(len(about), len(about) + 1) / self.deviation, known])
+        out[places] = _fitted(rest.varying + slopes @ about, slopes, about, prior, least, white, full)
         for row in _friction_rows(self.plant):  # but for rounding they are within full friction
             out[states_of(row)] /= max(float(np.linalg.norm(out[states_of(row)])), 1.0)
         return out
 
-    def _compared(self, x: Array) -> Array:
+    def _compared(self, x: Array) -> _Left:
         count = len(x) // self.block
         means = x[: count * self.block].reshape(count, self.block, *x.shape[1:]).mean(axis=1)
-        return np.asarray(means - means.mean(axis=0))[:, self.plant.axes]
+        mean = means.mean(axis=0)
+        return _Left(np.asarray(means - mean)[:, self.plant.axes], np.asarray(mean)[self.plant.axes])
 
 
 def _fitted(
     rest: Array,
     slopes: Array,
     found: Array,
-    deviation: float,
+    prior: Array,
     least: Array,
     white: bool,
     full: Sequence[NDArray[np.bool_]],
 ) -> Array:
     """Most probable states (k,) by what the balance (n, a) leaves without them, and its slopes (n, a, k).
 
-    Each has this prior deviation, and the error at least `least` (a,). It is first that which the states `found` leave;
-    `white`, without correlation, as long as the states that are to explain the balance would be its own. full: the
-    states of each seal and pad, whose norm is at most one.
+    prior (p, k + 1): rows of further squares, what they are to be in the last column. The error is at least `least`
+    (a,), and first that which the states `found` leave; `white`, without correlation, as long as the states that are to
+    explain the balance would be its own. full: the states of each seal and pad, whose norm is at most one.
     """
     count = len(found)
-    prior = np.eye(count, count + 1) / deviation
     for nth in range(WEIGHINGS):
         left = rest - slopes @ found
         size = np.maximum(np.sum(left**2, axis=0), np.finfo(float).tiny)

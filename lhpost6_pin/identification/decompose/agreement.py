@@ -172,7 +172,7 @@ def summed(found: Decomposed, changes: Iterable[Change]) -> Changes:
 def _noise(found: Decomposed, sensors: SensorSet, rng: np.random.Generator) -> Change:
     """Change by a second draw of noise."""
     policy = AS_RECORDED._replace(band=found.comparison.band)
-    noisier = prepare_test(found.plant, add_noise(found.record, sensors, rng), sensors, policy)
+    noisier = prepare_test(found.plant, add_noise(found.record, sensors, rng), sensors.drawn_twice(), policy)
     drawn = decompose_test(found.mounted, noisier, found.whole.states.z[0])[0]
     return Change(drawn.residual - found.whole.residual, drawn.carried - found.whole.carried)
 

@@ -95,7 +95,7 @@ def prepare(machine: Machine, record: xr.Dataset, basis: ComparisonBasis) -> Pre
     plant = make_plant(table)
     noisy = add_noise(record, sensors, np.random.default_rng(SEED))
     policy = AS_RECORDED._replace(band=basis.numbers.band)
-    both = (prepare_test(plant, r, sensors, policy) for r in (record, noisy))
+    both = prepare_test(plant, record, sensors, policy), prepare_test(plant, noisy, sensors.drawn_twice(), policy)
     time = record["time"].values
     return PreparedTest(basis, plant, time - float(time[0]), *both)
 

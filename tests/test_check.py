@@ -337,7 +337,8 @@ def test_lengths_of_turned_sign_or_in_a_wrong_unit_contradict_the_pose(tests):
     right = campaign_check.check_campaign(MACHINE, [tests["EQ"]], "lhpost6")
     assert right is not None and right.contradictions == ()
     length, place = "actuator_displacement", {"actuator": "H2"}
-    for factor, remedy in ((-1.0, "turned; correct its sign"), (25.4, "correct its unit or factor")):
+    remedies = "turned; correct its sign", "correct its unit or factor", "it does not respond; mend the sensor"
+    for factor, remedy in zip((-1.0, 25.4, 0.0), remedies, strict=True):
         wrong = tests["EQ"].copy(deep=True)
         wrong[length].loc[place] *= factor
         found = campaign_check.check_campaign(MACHINE, [wrong], "lhpost6")

@@ -165,6 +165,9 @@ def test_a_phase_at_its_floor_before_any_effect_is_no_evidence():
     found = identified(Gap("inverse dynamics", "EQ", 2.35, 1.47, 1.14, 1.73))
     assert floor_note(found).startswith("At the floor without effects already: inverse dynamics, EQ.")
     assert floor_note(identified(Gap("inverse dynamics", "EQ", 9.0, 5.0, 1.1, 1.0))) == ""
+    for after, evidence in ((0.4, "and the balances are the evidence"), (0.98, "nor do their balances show it")):
+        found.balances = (Balance("wrench", "EQ", (1.2, 1.0, after)),)
+        assert evidence in floor_note(found)
 
 
 def test_what_a_refit_explains_a_fall_of_the_error_by_is_stated(monkeypatch):

@@ -23,6 +23,9 @@ __all__ = ["CampaignCheck", "check_campaign", "contradicting_sensors"]
 WRONG = 1.5
 """Factor of a gain, either way, beyond which a unit or a factor of a channel map is wrong rather than a calibration."""
 
+DEAD = 1e-9
+"""Gain over what it should be below which a sensor shows nothing of what the others do: no unit is that wrong."""
+
 UNEVEN = 2.0  # a column is that much noisier than those like it: a loose cable rather than a worse sensor
 
 
@@ -46,11 +49,16 @@ class CampaignCheck:
         gains = [f for f in self.findings or () if f.quantity.startswith("gain") and f.verdict == "suspicious"]
         found = []
         for one in gains:
-            ratio = one.estimate / one.expected
-            if ratio < 0.0:
-                found.append(f"{one.channel}: {one.check}: gain {one.estimate:.4g}: turned; correct its sign")
-            elif max(ratio, 1.0 / max(ratio, 1e-300)) > WRONG:
-                found.append(f"{one.channel}: {one.check}: gain {one.estimate:.4g}: correct its unit or factor")
+            ratio, again = one.estimate / one.expected, "in the channel map, and import again"
+            remedy = ""
+            if abs(ratio) < DEAD:
+                remedy = "it does not respond; mend the sensor"
+            elif ratio < 0.0:
+                remedy = f"turned; correct its sign {again}"
+            elif max(ratio, 1.0 / ratio) > WRONG:
+                remedy = f"correct its unit or factor {again}"
+            if remedy:
+                found.append(f"{one.channel}: {one.check}: gain {one.estimate:.4g}: {remedy}")
         return tuple(found)
 
     @property

@@ -39,6 +39,9 @@ OPEN = 0.1
 FALLS = 2.0
 """Error as delivered over that of a refit from which it is stated what the refit explains it by."""
 
+MOVES = 0.05
+"""Share by which effects lower the error of a balance at least where it is evidence for them: scatter is less."""
+
 LISTED = 3  # sensor errors that are named
 
 
@@ -68,9 +71,15 @@ def floor_note(found: "Discovery") -> str:
     hidden = [f"{gap.phase}, {gap.test}" for gap in gaps if math.isnan(gap.closure)]
     if not hidden:
         return ""
+    shown = any(b.error[1] - b.error[2] > MOVES * b.error[1] for b in found.balances)
+    evidence = (
+        "the balances are the evidence"
+        if shown
+        else "nor do their balances show it: evidence is in the tests of the search alone, of which one may be held out"
+    )
     return (
         f"At the floor without effects already: {'; '.join(hidden)}. Sensor noise, also that in the state of friction, "
-        "hides there what the effects do: no closure is stated, and the balances are the evidence."
+        f"hides there what the effects do: no closure is stated, {'and ' * shown}{evidence}."
     )
 
 

@@ -55,6 +55,9 @@ export function show(input, value) {
   if (input.type === "checkbox") { if (input.checked !== value) input.checked = value; }
   else if (input.value !== value) input.value = value;
 }
+export function typedNumber(input) { // "05" is what some browsers leave of "0,5"
+  return /^-?0\d/.test(input.value) ? NaN : input.valueAsNumber;
+}
 export function trimmed(value, digits) { // for an input: 100, not 100.000
   return String(Number(value.toFixed(digits)));
 }

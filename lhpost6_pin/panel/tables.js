@@ -1,5 +1,5 @@
 // What the page lists: axes, interlocks, bars, recordings, faults, log.
-import { decimals, factor, follow, make, measure, meter, number, part, show, slug, spoken, trimmed, write } from "./parts.js";
+import { decimals, factor, follow, make, measure, meter, number, part, show, slug, spoken, trimmed, typedNumber, write } from "./parts.js";
 
 const LISTED = 10, KEPT = 400; // bars below each other; entries of the log on the page
 
@@ -14,9 +14,9 @@ export function buildAxes(hello, send, complain) {
       input.dataset.hint = `${what === "span" ? "Amplitude of the function generator" : "Where the axis rests"}; limit ± ${limit.toPrecision(3)} ${unit}`;
       if (!free) input.dataset.never = `${axis} is locked on this machine`;
       follow(input, () => {
-        const value = input.valueAsNumber;
+        const value = typedNumber(input);
         if (Number.isFinite(value)) send({ do: what, axis, value: value / factor(unit) });
-        else { complain(`The ${what} of ${axis} is no number; enter one in ${unit}.`); input.dataset.held = "0"; }
+        else { complain(`The ${what} of ${axis} is no number; enter one in ${unit}, with a decimal point.`); input.dataset.held = "0"; }
       });
       return make("td", {}, input);
     });
@@ -51,10 +51,12 @@ function buildInterlocks(interlocks, send, complain) {
     on.setAttribute("aria-label", `interlock of ${said} on`);
     limit.setAttribute("aria-label", `limit of ${said} in percent of capacity`);
     on.dataset.hint = "Off: this interlock does not trip";
-    limit.dataset.hint = "Trips when the present demand passes this share of the capacity";
+    const demand = name === "force" || name === "overturning" ? "what the present demand adds to rest" : "the present demand";
+    limit.dataset.hint = `Trips when ${demand} passes this share of ${name === "force" ? "what rest leaves of the range" : "the capacity"}`;
     follow(on, () => send({ do: "interlock", name, on: on.checked }));
     follow(limit, () => {
-      if (limit.valueAsNumber > 0) send({ do: "interlock", name, limit: limit.valueAsNumber / 100 });
+      const value = typedNumber(limit);
+      if (value > 0) send({ do: "interlock", name, limit: value / 100 });
       else { complain(`The limit of ${said} is no number above 0; enter one in % of the capacity.`); limit.dataset.held = "0"; }
     });
     const bar = meter("", false);

@@ -245,10 +245,11 @@ class PanelServer:
             column = of(row, f"chamber_pressure_{letter}")[0] / supply
             shown = _named([f"{name} {letter.upper()}" for name in names], column)
             pressures |= {k: v for k, v in shown.items() if letter == "a" or v > 0.0}
+        spool, command = (of(row, f"spool_{what}")[0] for what in ("position", "command"))
         return {
             "force": _named(names, share),
             "pressure": pressures,
-            "spool": _named(names, of(row, "spool_command")[0]),
+            "spool": _named(names, np.where(np.isfinite(spool), spool, command)),  # a server may show commands alone
             "limits": _named(AXES, limits),
         }
 

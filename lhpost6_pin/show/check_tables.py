@@ -55,7 +55,7 @@ def print_check(found: CampaignCheck) -> None:
 
 def print_contradictions(found: Sequence[str]) -> None:
     """Print a warning for every contradiction of redundant sensors, as `check` and `import` do."""
-    print_blocks(*(f"warning: {words} in the channel map, and import again" for words in found))
+    print_blocks(*(f"warning: {words}" for words in found))
 
 
 def campaign_entries(tests: Sequence[RecordSummary]) -> dict[str, Any]:

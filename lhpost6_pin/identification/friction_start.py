@@ -101,9 +101,10 @@ def estimate_start(plant: Plant, test: MeasuredTest, cutoff: float) -> Array:
         measured = leg_wrenches(plant, plant_motion(plant, test.motion).q, force).sum(axis=1)[:, plant.axes]
         return _without_noise(_Balance(plant, test, 1), np.std(measured, axis=0))
     balance, none = _Balance(plant, test, block), np.zeros(len(plant.axes))
-    stays = np.abs(balance.left(state).mean)
+    stays = none
     for nth in range(ROUNDS):
         rest = balance.left(state)
+        stays = np.abs(rest.mean) if nth == 0 else stays
         if not rest.varying.any(axis=0).all():  # without any error: nothing is to be explained
             break
         spread = stays + rest.varying.std(axis=0)
@@ -117,8 +118,8 @@ def _without_noise(balance: "_Balance", measured: Array) -> Array:
     The prior decides between states that the balance does not distinguish.
     """
     zero = state = np.zeros(len(balance.plant.states))
-    start = balance.left(zero)
-    first = rest = start.varying
+    left = balance.left(zero)
+    first = rest = left.varying
     least = BALANCED * np.maximum(measured, SHOWN * measured.max())
     if np.all(np.mean(first**2, axis=0) <= least**2):
         return zero
@@ -128,9 +129,9 @@ def _without_noise(balance: "_Balance", measured: Array) -> Array:
         return bool(by * np.sum((rest / least) ** 2) <= np.sum((first / least) ** 2))
 
     for nth in range(MOST_ROUNDS):
-        last, state = state, balance.fitted(state, start, least, apart=NEAR if nth else APART, white=nth == 0)
-        start = balance.left(state)
-        rest = start.varying
+        last, state = state, balance.fitted(state, left, least, apart=NEAR if nth else APART, white=nth == 0)
+        left = balance.left(state)
+        rest = left.varying
         if np.abs(state - last).max() < SETTLED or (nth + 1 == ROUNDS and not lowered(2.0)):
             break
     return state if lowered(_number("friction.held_gain")) else zero

@@ -223,8 +223,7 @@ def _pairs(plant: Plant, record: xr.Dataset, dt: float) -> Iterator[tuple[str, s
             measured = differentiate(record["actuator_displacement"].values, dt)
             yield "actuator_displacement", base, measured, differentiate(legs[:, :count], dt)
         if "strut_pressure" in record:
-            with np.errstate(invalid="ignore", divide="ignore"):
-                gas = strut_pressures(plant.machine, legs[:, count:])
+            gas = strut_pressures(plant.machine, legs[:, count:])
             if np.isfinite(gas).all():  # else a wrong unit of displacement leaves no length of gas
                 yield "strut_pressure", base, record["strut_pressure"].values, gas
     if {"actuator_force", "chamber_pressure_a"} <= set(record.data_vars):

@@ -246,8 +246,7 @@ def _struts(view: RecordView) -> Iterator[SensorComparison]:
         return
     elongation = leg_displacements(plant, view.values("platen_displacement"))[0][:, plant.spools :]
     level = np.array([s.pressure for s in machine.struts])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        due = strut_pressures(machine, elongation) - level
+    due = strut_pressures(machine, elongation) - level
     if not np.isfinite(due).all():  # a wrong unit of displacement leaves no length of gas
         return
     measured, (swing, rate) = view.signal(view.values("strut_pressure")), view.signals(due, 0, 1)

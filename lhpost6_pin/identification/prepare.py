@@ -25,7 +25,7 @@ from ..data.alignment import Delay, align_record, group_delays, oil_force
 from ..data.channels import LAYOUT, MOTION, channel_name
 from ..data.fusion import fuse_motion
 from ..data.records import is_measured, refuse_other_machine, require, sample_interval
-from ..data.sensors import SensorSet
+from ..data.sensors import SensorSet, add_noise
 from ..data.signals import Band, differentiate
 from ..data.valve_pairs import with_joint_spools
 from ..machine.machine import Machine
@@ -35,7 +35,7 @@ from ..mechanics.strokes import stroke_ends
 
 __all__ = ["AS_RECORDED", "CALIBRATION", "EACH_TEST", "HALF_PLAY", "ROD_LENGTH", "SIGNIFICANT", "MeasuredTest"]
 __all__ += ["Policy", "actuator_forces", "align_records", "find_delays", "oil_forces", "chamber_pressures"]
-__all__ += ["check_usable", "prepare_test", "source_of"]
+__all__ += ["check_usable", "prepare_noisier", "prepare_test", "source_of"]
 
 
 log = logging.getLogger(__name__)
@@ -204,6 +204,13 @@ def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, po
     _warn_of_strokes(plant, name, record, fused.motion)
     side = _contact_side(plant, record, fused.motion, dt, cutoff)
     return MeasuredTest(name, dt, fused.motion, channels, rates, fused.path, fused.share, fused.used, side, record)
+
+
+def prepare_noisier(
+    plant: Plant, record: xr.Dataset, sensors: SensorSet, policy: Policy, rng: np.random.Generator
+) -> MeasuredTest:
+    """The test of a record, as `prepare_test`, with a second draw of the noise that it has."""
+    return prepare_test(plant, add_noise(record, sensors, rng), sensors.drawn_twice(), policy)
 
 
 def _contact_side(

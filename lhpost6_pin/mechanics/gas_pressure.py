@@ -33,6 +33,7 @@ def gas_numbers(machine: Machine) -> Array:
 
 
 def gas_pressures(numbers: Array, elongation: Array) -> Array:
-    """Nitrogen pressures as `strut_pressures`, of the numbers of a machine."""
+    """Nitrogen pressures as `strut_pressures`, of the numbers of a machine; not finite where no gas length is left."""
     law = gas_pressure.py_func  # type: ignore[attr-defined]  # the scalar law as plain Python takes whole columns
-    return np.asarray(law(elongation, *numbers), np.float64)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(law(elongation, *numbers), np.float64)

@@ -1,5 +1,5 @@
 // Orders: what may be done now, why not otherwise, and what comes next.
-import { GRAVITY, factor, make, part, show, write } from "./parts.js";
+import { GRAVITY, factor, make, part, show, typedNumber, write } from "./parts.js";
 
 let hello = null, state = null, send = () => {}, complain = () => {}, loading = null, refused = 0;
 
@@ -22,7 +22,7 @@ function still() { // the axes of the generator whose span is zero
 function amiss() { // why the chosen program cannot be run, in words
   const chosen = source(), fields = chosen === "motion" ? ["motion-scale"] : swept() ? ["frequency", "to", "duration"] : ["frequency", "cycles"];
   for (const id of fields) {
-    const value = part(id).valueAsNumber;
+    const value = typedNumber(part(id));
     if (!(value > 0) && !(id === "cycles" && part(id).value === "" && !part(id).validity.badInput)) return `the ${id.replace("motion-", "")} must be a number above 0`;
   }
   if (!checked(chosen).length) return "choose an axis of the program";

@@ -20,12 +20,12 @@ from ...core.arrays import Array, Mask
 from ...data.alignment import phase_delay
 from ...data.at_rest import at_rest
 from ...data.channels import LAYOUT
-from ...data.sensors import SensorSet, add_noise
+from ...data.sensors import SensorSet
 from ...data.signals import Band, correlation, differentiate, peak_ratio, rrmse
 from ...mechanics.plant import make_plant
 from ...mechanics.pose import PlatenMotion
 from ..inverse_dynamics import leg_wrenches
-from ..prepare import AS_RECORDED, prepare_test
+from ..prepare import AS_RECORDED, prepare_noisier
 from ..residuals import evaluate_residuals, follow
 from .interface import InterfaceWrench, find_interface, interface_at
 from .record import Decomposed, decompose_numbers, decompose_test
@@ -172,7 +172,7 @@ def summed(found: Decomposed, changes: Iterable[Change]) -> Changes:
 def _noise(found: Decomposed, sensors: SensorSet, rng: np.random.Generator) -> Change:
     """Change by a second draw of noise."""
     policy = AS_RECORDED._replace(band=found.comparison.band)
-    noisier = prepare_test(found.plant, add_noise(found.record, sensors, rng), sensors.drawn_twice(), policy)
+    noisier = prepare_noisier(found.plant, found.record, sensors, policy, rng)
     drawn = decompose_test(found.mounted, noisier, found.whole.states.z[0])[0]
     return Change(drawn.residual - found.whole.residual, drawn.carried - found.whole.carried)
 

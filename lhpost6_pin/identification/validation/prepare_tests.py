@@ -14,7 +14,7 @@ from ...control import ControllerSettings
 from ...core.arrays import Array
 from ...core.files import models_folder
 from ...data.records import require
-from ...data.sensors import SensorSet, add_noise
+from ...data.sensors import SensorSet
 from ...data.signals import Band
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
@@ -22,7 +22,7 @@ from ...mechanics.linearize import OilColumnMode
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import PlatenMotion, plant_motion
 from ..inverse_dynamics import leg_wrenches
-from ..prepare import AS_RECORDED, MeasuredTest, check_usable, prepare_test
+from ..prepare import AS_RECORDED, MeasuredTest, check_usable, prepare_noisier, prepare_test
 
 __all__ = ["ComparisonBasis", "Numbers", "PreparedTest", "prepare", "too_short", "total_wrench", "validation_numbers"]
 __all__ += ["wrench_calibration"]
@@ -93,11 +93,11 @@ def prepare(machine: Machine, record: xr.Dataset, basis: ComparisonBasis) -> Pre
     table, sensors = machine.as_tested(record.attrs, "the test"), basis.sensors
     check_usable(table, record)
     plant = make_plant(table)
-    noisy = add_noise(record, sensors, np.random.default_rng(SEED))
     policy = AS_RECORDED._replace(band=basis.numbers.band)
-    both = prepare_test(plant, record, sensors, policy), prepare_test(plant, noisy, sensors.drawn_twice(), policy)
+    test = prepare_test(plant, record, sensors, policy)
+    again = prepare_noisier(plant, record, sensors, policy, np.random.default_rng(SEED))
     time = record["time"].values
-    return PreparedTest(basis, plant, time - float(time[0]), *both)
+    return PreparedTest(basis, plant, time - float(time[0]), test, again)
 
 
 def total_wrench(plant: Plant, motion: PlatenMotion, force: Array) -> Array:

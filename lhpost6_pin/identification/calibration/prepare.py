@@ -11,14 +11,14 @@ from ...core.errors import RecordError
 from ...data.channels import calibrated_channels, channel_name, columns_of
 from ...data.layout_faults import layout_faults
 from ...data.observable import observable
-from ...data.sensors import SensorSet, add_noise
+from ...data.sensors import SensorSet
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
 from ...mechanics.plant import make_plant
 from ...mechanics.pose import plant_motion
 from ...simulation.specimen_response import driven_wrenches
 from ..friction_start import start_deviation
-from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, prepare_test
+from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, prepare_noisier, prepare_test
 from .problem import KINDS, Problem, ResidualBands
 from .sensor_errors import removed_delays
 from .usable_tests import too_short
@@ -67,8 +67,7 @@ def prepare_problem(
     removed = removed_delays(delays, sensors)
     rng = np.random.default_rng(seed)
 
-    def prepared(record: xr.Dataset, policy: Policy) -> MeasuredTest:
-        test = prepare_test(plant, record, sensors, policy)
+    def carrying(test: MeasuredTest) -> MeasuredTest:
         if specimen is None:
             return test
         moved = plant_motion(plant, test.motion)
@@ -76,9 +75,9 @@ def prepare_problem(
         return replace(test, carried=sways)
 
     def drawn(policy: Policy) -> list[MeasuredTest]:
-        return [prepared(add_noise(r, sensors, rng), policy) for r in records]
+        return [carrying(prepare_noisier(plant, r, sensors, policy, rng)) for r in records]
 
-    tests = [prepared(r, policy) for r in records]
+    tests = [carrying(prepare_test(plant, r, sensors, policy)) for r in records]
     noisy = [test for _ in range(int(n("fit.draws"))) for test in drawn(policy._replace(shares=False))]
     again = [drawn(policy) for _ in range(int(n("fit.corrections")))]
     problem = Problem(

@@ -89,7 +89,13 @@ def test_names_of_tests_tell_them_apart(tmp_path, campaign):
     assert [test.name for test in find_tests([other])] == ["t2_noise_csv", "t2_noise_txt"]
     with pytest.raises(RecordError, match=r"noise\.csv: is given twice"):
         find_tests([other, other / "noise.csv"])
-    with pytest.raises(RecordError, match="holds no data file; name the folders in it: t1, t2"):
+    records = tmp_path / "panel"
+    records.mkdir()
+    for name in ("EQTEST.nc", "journal.jsonl"):
+        (records / name).write_text("")
+    with pytest.raises(RecordError, match=r"its records \(\.nc\) need no import: `lhpost6 check .*panel`"):
+        find_tests([records])
+    with pytest.raises(RecordError, match="holds no data file; name the folders in it: panel, t1, t2"):
         find_tests([tmp_path])
     (tmp_path / "empty").mkdir()
     with pytest.raises(RecordError, match="empty: holds no data file; name the folder of the data files"):

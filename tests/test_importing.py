@@ -254,6 +254,25 @@ def test_a_named_column_of_seconds_is_taken_before_clock_times(tmp_path):
     np.testing.assert_array_equal(one(put(tmp_path, "run.csv", text)).time, [0.0, 0.5])
 
 
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+def test_a_date_in_a_column_of_its_own_is_read_with_the_time_of_day_beside_it(tmp_path, separator):
+    rows = ["Date Time x_[m]", "31.12.2026 23:59:59.5 1", "01.01.2027 00:00:00.0 2", "01.01.2027 00:00:00.5 3"]
+    found = one(put(tmp_path, "run.csv", "\n".join(row.replace(" ", separator) for row in rows) + "\n"))
+    np.testing.assert_array_equal(found.time, [0.0, 0.5, 1.0])
+    assert list(found.names) == ["x_[m]"]
+    np.testing.assert_array_equal(found.values[:, 0], [1.0, 2.0, 3.0])
+
+
+def test_dates_without_times_of_day_are_refused(tmp_path):
+    with pytest.raises(RecordError, match="'Date' has dates, and no column has times of day; leave it out"):
+        one(put(tmp_path, "run.csv", "Date,x [m]\n2026-01-01,1\n2026-01-01,2\n"))
+
+
+def test_a_header_of_another_length_is_named(tmp_path):
+    with pytest.raises(RecordError, match=r"line 2: no header row of 3 names.*has 2 \(time \[s\], x \[m\]\)"):
+        one(put(tmp_path, "run.csv", "time [s],x [m]\n0,1,2\n0.5,2,3\n"))
+
+
 @pytest.mark.parametrize(
     ("text", "phrase"),
     [
@@ -269,8 +288,8 @@ def test_clock_times_that_are_no_time_axis_are_refused_with_line_and_column(tmp_
 
 
 def test_a_column_that_is_no_number_is_named(tmp_path):
-    text = "Date,Time,x [m],y [m]\n2026-01-01,12:00:00.0,1,2\n2026-01-01,12:00:00.5,1,2\n"
-    with pytest.raises(RecordError, match=r"line 2, column 1: '2026-01-01' is neither .* leave it out"):
+    text = "State,Time,x [m],y [m]\nrun_1,12:00:00.0,1,2\nrun_1,12:00:00.5,1,2\n"
+    with pytest.raises(RecordError, match=r"line 2, column 1: 'run_1' is neither .* leave it out"):
         load_raw(put(tmp_path, "run.csv", text))
 
 

@@ -52,7 +52,7 @@ def test_an_unknown_name_lists_the_valid_ones_and_an_unknown_option_the_options(
         find_motion("sine", amplitud=1)
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, -0.1, 0.0, "1", None, [1.0, 2.0]])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, -0.1, 0.0, "-1", None, [1.0, 2.0]])
 @pytest.mark.parametrize(
     ("name", "option"),
     [

@@ -242,7 +242,7 @@ def test_one_operates_others_watch_and_a_browser_that_leaves_in_mid_run_stops_th
             await ben.until(lambda: ben.state["trip"])
             return ben.log
 
-    assert "Anna left the panel in mid-run: the program is stopped" in asyncio.run(drive())
+    assert "Anna left the panel in mid-run: its program is ordered to stop" in asyncio.run(drive())
 
 
 def listeners(pids: list[int]) -> dict[int, set[tuple[str, str]]]:

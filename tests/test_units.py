@@ -3,7 +3,7 @@
 import pytest
 
 from lhpost6_pin.core import units
-from lhpost6_pin.core.units import parse_unit, quantity_unit
+from lhpost6_pin.core.units import numbers_in, parse_unit, quantity_unit
 
 
 @pytest.mark.parametrize("spelled", sorted(set(units._PLAIN) - {"1"}))
@@ -41,3 +41,23 @@ def test_units_of_us_data_sheets_are_known():
 @pytest.mark.parametrize("text", ["dB", "degC", "furlongs per fortnight", "", "m^9", "__import__('os')"])
 def test_what_is_no_unit_with_a_factor_is_none(text):
     assert parse_unit(text) is None and quantity_unit(text) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "numbers"),
+    [
+        ("50mm", "m", [0.05]),
+        ("-3 cm", "m", [-0.03]),
+        ("0.05", "m", [0.05]),
+        ("100, 200, 300 mm", "m", [0.1, 0.2, 0.3]),
+        ("1 cm, 2 mm", "m", [0.01, 0.002]),
+        ("180 deg", "rad", [3.141592653589793]),
+        ("1 cm, 2", "m", None),  # of the second it is not known
+        ("1 deg", "m", None),
+        ("1 furlong per fortnight", "m", None),
+        ("many", "m", None),
+        ("", "m", None),
+    ],
+)
+def test_numbers_of_a_text_are_read_with_their_units(text, unit, numbers):
+    assert numbers_in(text, unit) == (numbers if numbers is None else pytest.approx(numbers, rel=1e-12))

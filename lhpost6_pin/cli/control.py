@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ..core.errors import OutOfRangeError, SimulationError
+from ..core.errors import MotionError, OutOfRangeError, SimulationError
 from ..core.names import AXES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
@@ -142,7 +142,10 @@ def replay(
 def sine(
     machine: opt.SpecimenOptions,
     amplitude: Annotated[
-        float | None, typer.Option(min=0.0, help=r"Amplitude \[m, or rad]; default: half of what fits.")
+        str | None,
+        typer.Option(
+            metavar="<quantity>", help=r"Amplitude \[m, or rad], or with a unit: 50mm; default: half of what fits."
+        ),
     ] = None,
     frequency: Annotated[float, typer.Option(min=0.0, help="Frequency [Hz].")] = 0.5,
     axis: Annotated[
@@ -166,18 +169,32 @@ def sine(
     table = machine.load(valves)
     plant = make_plant(table)
     axis_row(plant, axis)
-    amplitude = default_amplitude(plant, axis, frequency) if amplitude is None else amplitude
+    size = default_amplitude(plant, axis, frequency) if amplitude is None else _amplitude(amplitude, axis)
     settings = opt.find_settings(controller, table)
-    folder = opt.folder_for(out, f"sine_{axis}_{amplitude:g}_{frequency:g}Hz", "report.html")
+    folder = opt.folder_for(out, f"sine_{axis}_{size:g}_{frequency:g}Hz", "report.html")
     if not beyond:
         try:
-            check_motion_limits(plant, sine_target(axis, amplitude, frequency)[0])
+            check_motion_limits(plant, sine_target(axis, size, frequency)[0])
         except OutOfRangeError as error:
-            fits = rounded_down(amplitude * (error.largest_scale or 0.0), 3)
+            fits = rounded_down(size * (error.largest_scale or 0.0), 3)
             hint = f". The largest --amplitude that fits is {fits:g}" if fits else ""
             raise OutOfRangeError(f"{error}{hint}", error.largest_scale, error.exceeded) from None
     loop = loop_facts(checked_loop(table, settings, machine), machine)
     with progress_bar(f"sine in {axis} on {table.name}") as progress:
-        found = sine_test(table, settings, axis=axis, amplitude=amplitude, frequency=frequency, progress=progress)
+        found = sine_test(table, settings, axis=axis, amplitude=size, frequency=frequency, progress=progress)
     report = write_sine_report(found, folder / "report.html", command=repeating_command(), loop=loop)
     print_result(json, lambda: sine_entries(found) | loop_entries(loop), lambda: print_sine(found, loop), [report])
+
+
+def _amplitude(text: str, axis: str) -> float:
+    """Amplitude on an axis [m, rad], as a user wrote it."""
+    from ..core.units import numbers_in
+
+    unit = "m" if axis in AXES[:3] else "rad"
+    numbers = numbers_in(text, unit)
+    if numbers is None or len(numbers) > 1:
+        example = "50mm" if unit == "m" else "1deg"
+        raise MotionError(
+            f"--amplitude {text}: give one number in {unit}, or with a unit of the same kind, as {example}"
+        )
+    return numbers[0]

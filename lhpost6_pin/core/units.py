@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import NamedTuple
 
-__all__ = ["SI_UNITS", "Unit", "parse_unit", "quantity_unit", "units_of"]
+__all__ = ["SI_UNITS", "Unit", "numbers_in", "parse_unit", "quantity_unit", "units_of"]
 
 _SPELLINGS = {  # by case-folded word; `g` is standard gravity, never gram
     **dict.fromkeys(("g", "gs"), "standard_gravity"),
@@ -25,6 +25,7 @@ _AS_WRITTEN = ("mPa", "Ms")
 """Words that differ from a spelling only in case and mean something else."""
 
 _FACTOR = r"(?:[^\W\d_]+|[°%])(?:(?:\^|\*\*)?(?:-[1-4]|[2-4]))?"
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _UNIT = re.compile(rf"{_FACTOR}(?:[*/]{_FACTOR}){{0,3}}")
 
 
@@ -79,6 +80,25 @@ def parse_unit(text: str) -> Unit | None:
     if spelled in _PLAIN:
         return _PLAIN[spelled]
     return _by_pint(spelled) if _UNIT.fullmatch(spelled) else None
+
+
+def numbers_in(text: str, unit: str) -> list[float] | None:
+    """Numbers of a text in the SI `unit`, apart by commas, as in "50 mm" or "0.5, 0.6 g"; None for any other text.
+
+    Each has a unit of its own, or the last one is of all, or none has one: they are in SI then.
+    """
+    found = [_QUANTITY.fullmatch(item) for item in text.split(",")]
+    stated = [match[2] if match else "" for match in found]
+    if not any(stated[:-1]):  # the last one is of all
+        stated = [stated[-1] or unit] * len(stated)
+    wanted = parse_unit(unit)
+    known = [parse_unit(word) if word else None for word in stated]
+    numbers = [
+        float(match[1]) * own.factor / wanted.factor
+        for match, own in zip(found, known, strict=True)
+        if match and own and wanted and own[1:] == wanted[1:]
+    ]
+    return numbers if len(numbers) == len(found) else None
 
 
 def _by_pint(spelled: str) -> Unit | None:

@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any, TypeAlias
 
 from ..core.errors import ParameterError, instead_of
+from ..core.units import parse_unit
 
 __all__ = ["EVIDENCE", "LARGEST", "Quantity", "Value", "read_number", "read_quantity", "to_unit", "unusable"]
 __all__ += ["vector_length"]
@@ -62,7 +63,11 @@ def to_unit(value: Value, unit: str, wanted: str, key: str) -> Value:
     try:
         factor = registry.Quantity(1.0, _pint_spelling(unit)).to(_pint_spelling(wanted)).magnitude
     except Exception as error:  # pint raises a dozen types for a bad unit
-        raise ParameterError(f"{key}: unit {unit!r} cannot be converted to {wanted!r}; give it in {wanted}") from error
+        own, target = parse_unit(unit), parse_unit(wanted)  # as files spell them: gpm, kips, g
+        if own is None or target is None or own[1:] != target[1:]:
+            what = f"unit {unit!r} cannot be converted to {wanted!r}; give it in {wanted}"
+            raise ParameterError(f"{key}: {what}") from error
+        factor = own.factor / target.factor
     if isinstance(value, tuple):
         return tuple(float(v) * factor for v in value)
     return float(value) * factor

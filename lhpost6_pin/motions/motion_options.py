@@ -1,14 +1,13 @@
 """Options of the motions made by name, and checks of their values."""
 
 import math
-import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.errors import MotionError
-from ..core.units import parse_unit
+from ..core.units import numbers_in
 from .motion import AXES
 from .toml import si_unit, values_of
 
@@ -16,7 +15,6 @@ __all__ = ["MotionOption", "checked_options", "options_of"]
 
 _MAY_BE_ZERO = ("height_ratio", "seed")
 _WHOLE = ("seed",)
-_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
 
 class MotionOption(NamedTuple):
@@ -64,9 +62,10 @@ def _checked(problem: str, key: str, default: Any, unit: str, value: Any) -> Any
             raise MotionError(f"{problem} one of {', '.join(AXES)}")
         return value
     known = f", in {unit} or followed by a unit of the same kind" if unit != "1" else ""
-    value = _in_si(value, unit) if isinstance(value, str) and key not in _WHOLE else value
+    if isinstance(value, str) and key not in _WHOLE and (numbers := numbers_in(value, unit)) is not None:
+        value = numbers if len(numbers) > 1 else numbers[0]
     if isinstance(default, list):
-        items = value.split(",") if isinstance(value, str) else np.ravel(np.asarray(value, dtype=object))
+        items = np.ravel(np.asarray(value, dtype=object))
         numbers = [_number(item) for item in items]
         if len(numbers) not in (1, len(default)) or not all(0 < number < math.inf for number in numbers):
             raise MotionError(f"{problem} {len(default)} finite positive numbers, or one for all{known}")
@@ -77,23 +76,6 @@ def _checked(problem: str, key: str, default: Any, unit: str, value: Any) -> Any
     if not possible or (key in _WHOLE and not number.is_integer()):
         raise MotionError(f"{problem} a {'whole' if key in _WHOLE else 'finite'} number, {least}{known}")
     return int(number) if key in _WHOLE else value
-
-
-def _in_si(text: str, unit: str) -> Any:
-    """Number of a text, or list of them, converted to the SI `unit`; the text itself if a unit is missing or unfit."""
-    found = [_QUANTITY.fullmatch(item) for item in text.split(",")]
-    stated = [match[2] if match else "" for match in found]
-    if not any(stated[:-1]):  # the last one is of all
-        stated = stated[-1:] * len(stated)
-    known, wanted = [parse_unit(word) if word else None for word in stated], parse_unit(unit)
-    numbers = [
-        float(match[1]) * own.factor
-        for match, own in zip(found, known, strict=True)
-        if match and own and wanted and own[1:] == wanted[1:]
-    ]
-    if len(numbers) < len(found):
-        return text
-    return numbers if len(numbers) > 1 else numbers[0]
 
 
 def _number(value: Any) -> float:

@@ -115,7 +115,9 @@ class Session:
         self.choice.cancel()
         status = self.status
         running = status.program if status is not None and status.state in ("running", "holding") else None
-        self.journal.note(client.name, "left the panel" + (" in mid-run: the program is stopped" if running else ""))
+        self.journal.note(
+            client.name, "left the panel" + (" in mid-run: its program is ordered to stop" if running else "")
+        )
         self._lost.add(client.key, self.journal.entries[-1]["time"], running)
         for other in self.clients.values():  # the same page may have come back before its loss was noticed
             self._notify_lost(other)

@@ -1,7 +1,7 @@
 """Clock times in tables of text, as loggers write them, read as seconds since the first.
 
-A stamp is a time of day, `12:00:00.25`, with or without a date before it in any usual order of day and month: dates are
-compared, not read. A day ends where the clock falls by more than half of it.
+A stamp is a time of day, `12:00:00.25`, with or without a date before it, or in a column of its own, in any usual order
+of day and month: dates are compared, not read. A day ends where the clock falls by more than half of it.
 """
 
 import re
@@ -19,39 +19,51 @@ Lines = list[tuple[int, str]]
 """Lines of a table, each with its number in the file."""
 
 DAY = 86400.0  # [s]
+_DATE = r"(?P<date>\d{1,4}(?P<mark>[-/.])\d{1,2}(?P=mark)\d{1,4})"
 _STAMP = re.compile(
-    r"(?:(?P<date>\d{1,4}(?P<mark>[-/.])\d{1,2}(?P=mark)\d{1,4})[\sT]+)?"
+    rf"(?:{_DATE}[\sT]+)?"
     r"(?P<hour>\d{1,2}):(?P<minute>[0-5]?\d):(?P<second>[0-5]?\d(?:[.,](?P<digits>\d*))?)"
     r"\s*(?P<half>[AaPp][Mm])?\s*(?:Z|[+-]\d{2}:?\d{2})?"
 )
 
 
 def is_stamp(field: str) -> bool:
-    """Whether a field is a time of day, with or without a date."""
-    return _STAMP.fullmatch(field) is not None
+    """Whether a field is a time of day, with or without a date, or a date."""
+    return _STAMP.fullmatch(field) is not None or _is_date(field)
 
 
-def take_stamps(rows: Lines, dialect: Dialect, names: Sequence[str], source: str) -> tuple[int | None, Lines, Array]:
-    """The column whose fields are stamps, the lines with zeros in it, and its seconds (n,) since the first.
+def _is_date(field: str) -> bool:
+    return re.fullmatch(_DATE, field) is not None
 
-    There is none (None) where the first line has no stamp. Raises RecordError naming line and column for a field that
-    is no stamp, for two columns of stamps, and as `seconds_of_stamps`.
+
+def take_stamps(rows: Lines, dialect: Dialect, names: Sequence[str], source: str) -> tuple[list[int], Lines, Array]:
+    """The columns of stamps and of their dates, if any, the lines with zeros in them, and seconds (n,) since the first.
+
+    There are none where the first line has no stamp. Raises RecordError naming line and column for a field that
+    is no stamp, for two columns of stamps, dates without times of day, and as `seconds_of_stamps`.
     """
     first = dialect.split(rows[0][1]) if rows else []
-    where = [k for k, field in enumerate(first) if is_stamp(field)]
-    if not where or len(first) != len(names):
-        return None, rows, np.zeros(0)
-    if len(where) > 1:
-        both = ", ".join(repr(names[k]) for k in where)
-        raise RecordError(f"{source}: {both} are all clock times; leave all but one out")
+    dates = [k for k, field in enumerate(first) if _is_date(field)]
+    clocks = [k for k, field in enumerate(first) if _STAMP.fullmatch(field)]
+    if not (dates or clocks) or len(first) != len(names):
+        return [], rows, np.zeros(0)
+    for columns, what in ((dates, "dates"), (clocks, "clock times")):
+        if len(columns) > 1:
+            both = ", ".join(repr(names[k]) for k in columns)
+            raise RecordError(f"{source}: {both} are all {what}; leave all but one out")
+    if not clocks:
+        raise RecordError(f"{source}: {names[dates[0]]!r} has dates, and no column has times of day; leave it out")
+    taken = clocks + dates
     stamps, bare = [], []
     for number, line in rows:
         fields = dialect.split(line)
         if len(fields) == len(names):  # lines of other lengths are refused with all others
-            stamps.append((number, fields[where[0]]))
-            fields[where[0]] = "0"
+            stamps.append((number, " ".join(fields[k] for k in (*dates, *clocks))))
+            for k in taken:
+                fields[k] = "0"
         bare.append((number, dialect.separator.join(f'"{x}"' if dialect.separator in x else x for x in fields)))
-    return where[0], bare, seconds_of_stamps(stamps, f"column {names[where[0]]!r}", source)
+    where = "column " + " and ".join(repr(names[k]) for k in (*dates, *clocks))
+    return taken, bare, seconds_of_stamps(stamps, where, source)
 
 
 def seconds_of_stamps(stamps: Lines, column: str, source: str) -> Array:

@@ -10,6 +10,7 @@ from ...core.files import reason_of
 __all__ = ["FileOfTest", "find_tests"]
 
 _NO_DATA = {".md", ".toml", ".pdf", ".png", ".jpg", ".jpeg", ".html", ".py", ".m", ".doc", ".docx", ".zip", ".nc"}
+_NO_DATA |= {".json", ".jsonl", ".tdms_index"}
 """Suffixes of files that a folder of tests may hold beside its data: records (.nc) are imported already."""
 
 
@@ -53,5 +54,7 @@ def _inside(folder: Path) -> list[Path]:
     if not files:
         below = [p.name for p in inside if p.is_dir()]
         remedy = f"name the folders in it: {', '.join(below[:8])}" if below else "name the folder of the data files"
+        if any(p.suffix.lower() == ".nc" for p in inside):
+            remedy = f"its records (.nc) need no import: `lhpost6 check {folder}`"
         raise RecordError(f"{folder}: holds no data file; {remedy}")
     return files

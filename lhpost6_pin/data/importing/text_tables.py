@@ -55,8 +55,8 @@ def read_table(content: bytes, source: str) -> RawTest:
     remedy = "correct it, or leave it empty for a missing sample"
     refused: dict[str, Any] = {"error": RecordError, "commas": _COMMAS, "correct": remedy}
     values = read_rows(rows, names, layout.dialect, source, **refused, holes=True)
-    if stamped is not None:
-        values[:, stamped], units[stamped] = seconds, "s"
+    if stamped:
+        values[:, stamped[0]], units[stamped[0]] = seconds, "s"
     if not names[-1] and np.isnan(values[:, -1]).all():  # each line ends with a separator
         names, units, values = names[:-1], units[:-1], values[:, :-1]
     facts = {m["key"]: m["value"].strip() for line in lines[: layout.first] if (m := _FACT.fullmatch(line.strip()))}
@@ -129,6 +129,10 @@ def _head(lines: Sequence[str], layout: _Layout, source: str) -> tuple[list[str]
     if not rows:
         commas = above and split_at_commas(lines[first], dialect, len(above[-1]))
         remedy = _COMMAS if commas else "add one, with units"
+        if not commas and above and len(above[-1]) > 1:
+            remedy = (
+                f"the last line above has {len(above[-1])} ({', '.join(above[-1])[:80]}); add or remove what differs"
+            )
         raise RecordError(f"{where}: no header row of {width} names above the numbers; {remedy}")
     names = rows[-1]
     if len(rows) == 2 and _is_unit_row(names):
@@ -166,14 +170,14 @@ def _raw_of_columns(
     units: Sequence[str | None],
     values: Array,
     facts: dict[str, str],
-    stamped: int | None = None,
+    stamped: Sequence[int] = (),
 ) -> RawTest:
-    """Take the column of time out of a table: one named so, else that of clock times, `stamped`."""
-    clocks = [k for k, name in enumerate(names) if time_unit(name, units[k])]
+    """Take the column of time out of a table: one named so, else that of clock times, `stamped`, and its dates."""
+    clocks = [k for k, name in enumerate(names) if time_unit(name, units[k]) and k not in stamped[1:]]
     if len(clocks) > 1:
         raise RecordError(f"{source}: {shown([names[k] for k in clocks])} are all named as time; rename all but one")
-    if not clocks and stamped is not None:
-        clocks = [stamped]
+    if not clocks:
+        clocks = [*stamped[:1]]
     if not clocks:  # named in a language of its own
         own = [k for k, unit in enumerate(units) if unit and quantity_unit(unit) == "s"]
         clocks = [k for k in own[:1] if len(values) > 1 and np.all(np.diff(values[:, k]) > 0)]
@@ -182,6 +186,6 @@ def _raw_of_columns(
         with np.errstate(over="ignore"):  # times without end are refused with their sample
             unit = time_unit(names[clocks[0]], units[clocks[0]]) or units[clocks[0]] or "s"
             time = values[:, clocks[0]] * si_factor(unit, "s")
-    rest = [k for k in range(len(names)) if k not in clocks]
+    rest = [k for k in range(len(names)) if k not in (*clocks, *stamped)]
     channels = [names[k] for k in rest], [units[k] for k in rest]
     return make_raw(source, form, *channels, values[:, rest], time, facts, numbers=[k + 1 for k in rest])

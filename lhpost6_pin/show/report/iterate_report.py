@@ -159,12 +159,13 @@ def iteration_tables(result: Iterated) -> list[Table]:
     spools = [(percent(i.peak_spool), i.clipped) for i in result.history]
     errors = [(*row, *use) for row, use in zip(rows("acceleration", percent), spools, strict=True)]
     header = ("Iteration", *_moved(result))
+    band = f"to {tuning_numbers().number('iteration.high'):g} Hz, delay removed"
     return [
-        Table("Acceleration RRMSE, delay removed", (*header, "Largest spool command", "Commands clipped"), errors),
+        Table(f"Acceleration RRMSE {band}", (*header, "Largest spool command", "Commands clipped"), errors),
         Table(
             "Delay removed, of the acceleration (negative: ahead of its target)", header, rows("delay", milliseconds)
         ),
-        Table("Displacement RRMSE, delay removed", header, rows("displacement", percent)),
+        Table(f"Displacement RRMSE {band}", header, rows("displacement", percent)),
     ]
 
 

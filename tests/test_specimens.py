@@ -10,6 +10,8 @@ from run_cases import at_rest, smooth_spools
 from scipy.interpolate import CubicSpline
 from scipy.linalg import eigh
 
+from lhpost6_pin.control import load_controller
+from lhpost6_pin.control.controller import controlled
 from lhpost6_pin.core.errors import SimulationError
 from lhpost6_pin.core.names import SCHEMES
 from lhpost6_pin.machine.machine import Machine, load_machine
@@ -230,6 +232,16 @@ def test_a_specimen_without_modes_is_the_urdf_with_locked_joints():
     table = mounted(rigid)
     other = make_plant(replace(table, specimen=_placed(table.specimen, *where)))
     assert [getattr(other.tables, name).tobytes() for name in ("inertia", "modes")] == same
+
+
+def test_the_controller_is_that_of_the_mass_carried_whatever_a_specimens_form():
+    """The force feedback of a frame with joints had been that of the platen alone, and its loop another one."""
+    forms = ("shear_frame_joints", False), ("shear_frame_joints", True), ("shear_frame", False)
+    tables = [load_machine().with_specimen(name, locked=locked) for name, locked in forms]
+    gains = [controlled(table, load_controller(table.controller))[2].axis["force_gain"] for table in tables]
+    bare = controlled(load_machine(), load_controller(load_machine().controller))[2].axis["force_gain"]
+    assert (gains[0] < 0.99 * bare).all()
+    np.testing.assert_allclose(gains[1:], [gains[0]] * 2, rtol=1e-6)  # digits of the files
 
 
 def _placed(specimen, position, rpy):

@@ -12,6 +12,7 @@ from ..effects.registry import parameters_of
 from ..laws.orifice import opening
 from ..machine.machine import Machine
 from ..mechanics.equilibrium import Equilibrium, find_equilibrium, unloaded_speeds
+from ..mechanics.payload import lock_joints
 from ..mechanics.plant import Plant, make_plant
 from ..mechanics.pose import kinematic_jacobian
 from ..mechanics.rigid_body import platen_inertia
@@ -115,8 +116,9 @@ def make_controller(plant: Plant, rest: Equilibrium, settings: ControllerSetting
     """Compute the controller's tables for a plant: filters, force gains, valves, null space of the motion.
 
     Force feedback of damping ratio zeta on an oil column of stiffness K and mass M is a velocity of
-    2 zeta / sqrt(K M) per unit force. Valve gains are steady unloaded piston velocities at full opening. Raises
-    ControllerError for settings whose rate differs from that of the samples.
+    2 zeta / sqrt(K M) per unit force; M is that of the platen with a specimen, its joints locked. Valve gains are
+    steady unloaded piston velocities at full opening. Raises ControllerError for settings whose rate differs from that
+    of the samples.
     """
     if settings.rate != SAMPLE_RATE:
         origin = settings.stated.origin
@@ -132,7 +134,8 @@ def make_controller(plant: Plant, rest: Equilibrium, settings: ControllerSetting
         oil[i] += p.bulk_modulus * p.area_b / p.chamber_b if p.area_b > 0.0 else 0.0
     stiffness = (jacobian.T * oil) @ jacobian
     lever = _lever(plant)
-    _, mass_at_b = platen_inertia(plant.model, plant.machine)
+    carrying = lock_joints(plant)  # whether a specimen moves or not, the table carries all of its mass
+    _, mass_at_b = platen_inertia(carrying.model, carrying.machine)
     back = np.linalg.inv(lever)
     mass = back.T @ mass_at_b @ back  # of C and Euler angles
     axis = np.zeros(axes.size, AXIS)

@@ -24,7 +24,7 @@ import numba
 
 from .files import refuse_folder
 
-__all__ = ["cache_folder", "compiled", "compiled_inline", "compiled_views"]
+__all__ = ["cache_folder", "compiled", "compiled_inline", "compiled_views", "copy_scaled"]
 
 log = logging.getLogger(__name__)
 
@@ -152,3 +152,13 @@ def _drop_old(base: Path, current: Path) -> None:
     others = [p for p in base.iterdir() if p.is_dir() and p != current]
     for old in sorted(others, key=lambda p: p.stat().st_mtime, reverse=True)[_KEEP:]:
         shutil.rmtree(old, ignore_errors=True)
+
+
+@compiled_inline
+def copy_scaled(factor, x, out):  # type: ignore[no-untyped-def]
+    """Fill out (n,) with `factor` times x (n,).
+
+    numba takes seconds to compile the first `out[:] = x` of a process: for the text of the error that shapes differ.
+    """
+    for k in range(out.size):
+        out[k] = factor * x[k]

@@ -23,6 +23,7 @@ __all__ = [
     "drift_rate",
     "fast_length",
     "lag",
+    "local_wiener",
     "lowpass_zero_phase",
     "peak_ratio",
     "resample_band_limited",
@@ -193,6 +194,24 @@ class Band:
         """
         x = np.asarray(x, dtype=float)
         return _filtered(x, dt, lambda f: self.gain(f).reshape(-1, *[1] * (x.ndim - 1)), keep_chord=not self.low)
+
+
+def local_wiener(x: ArrayLike, noise: ArrayLike, samples: int) -> Array:
+    """Local Wiener filter m + max(0, 1 - noise² / s²) (x - m), m and s² the mean and variance of `samples` about each.
+
+    What varies by no more than its noise, of standard deviation `noise` (), (1,) or (k,), becomes its local mean; what
+    varies by far more is left as it was.
+    """
+    from scipy.ndimage import uniform_filter1d
+
+    x = np.asarray(x, dtype=float)
+    wide = 2 * (max(samples, 1) // 2) + 1
+    mean = uniform_filter1d(x, wide, axis=0, mode="nearest")
+    variance = uniform_filter1d(np.square(x), wide, axis=0, mode="nearest") - np.square(mean)
+    power = np.broadcast_to(np.square(noise), x.shape)
+    return np.asarray(
+        mean + np.where(variance > power, 1.0 - power / np.maximum(variance, power + 1e-300), 0.0) * (x - mean)
+    )
 
 
 def differentiate(x: ArrayLike, dt: float, cutoff: float | None = None, order: int = 8) -> Array:

@@ -19,6 +19,7 @@ from ..core.arrays import Array
 from ..core.errors import ParameterError, RecordError, SimulationError
 from ..core.names import SAMPLE_RATE
 from ..data.campaign import Campaign
+from ..data.quiet_spools import quiet_spools
 from ..data.sensors import SensorSet
 from ..identification.calibration.free_parameters import with_parameters
 from ..identification.calibration.normal_equations import bounds_of
@@ -135,7 +136,8 @@ def _simulated(
     start (n_states,) is what friction holds at its start; None: nothing.
     """
     own = {"test": record.attrs.get("test", "test")}
-    run = replay(machine, record, attrs=own, friction=start, engine=fastest_engine(make_plant(machine))).record
+    quiet, engine = quiet_spools(record, sensors), fastest_engine(make_plant(machine))
+    run = replay(machine, quiet, attrs=own, friction=start, engine=engine).record
     rate = (record.sizes["time"] - 1) / float(record["time"][-1] - record["time"][0])
     every = max(1, round(SAMPLE_RATE / rate))
     sensed = as_sensed(run, sensors, SensorErrors({}, {}, {}), SAMPLE_RATE / every, rng)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.arrays import Array
-from ..core.compiled import compiled
+from ..core.compiled import compiled, copy_scaled
 from ..effects.actuator import advance_line, start_line, supplied
 from ..effects.evaluate import apply_forces
 from ..effects.registry import PORTS
@@ -56,7 +56,8 @@ def _residual(rows, tables, ports, required, z, measured, out):
             for i in range(port_force.size):
                 given += column[k, i, axes[j]] * port_force[i]
             rest[0, axes[j]] = required[k, axes[j]] - given
-        frame[:3] = ports.turn[k]
+        for i in range(3):
+            copy_scaled(1.0, ports.turn[k, i], frame[i])
         add_at_c(1.0, rest, 0, tables.body[0].rho_c, frame, out[k])
 
 
@@ -74,7 +75,8 @@ def _row_wrenches(rows, body, ports, z, out):
     frame, rho = np.zeros((8, 3)), body[0].rho_c
     for k in range(s.shape[0]):
         apply_forces(rows, s[k], ports.rate[k], z[k], force, port_force)
-        frame[:3] = ports.turn[k]
+        for i in range(3):
+            copy_scaled(1.0, ports.turn[k, i], frame[i])
         for i in range(rows.size):
             add_row_at_c(force[i], ports.column[k], rows[i], rho, frame, out[k, i])
 

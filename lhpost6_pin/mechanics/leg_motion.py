@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from ..core.cholesky import solve_positive
-from ..core.compiled import compiled, compiled_views
+from ..core.compiled import compiled, compiled_views, copy_scaled
 from .ports import platen_pose
 from .schemes import set_twist
 from .spatial import cross, from_body, to_body
@@ -46,8 +46,8 @@ def follow_platen(q, v, packed, zero, buffer):
     platen_pose(q, tables.axes, body, frame)
     set_twist(v, tables.axes, frame)
     twist = np.empty(6)
-    twist[:3] = frame[4]
-    twist[3:] = frame[5]
+    copy_scaled(1.0, frame[4], twist[:3])
+    copy_scaled(1.0, frame[5], twist[3:])
     n = 0
     for i in range(legs.size):
         leg = legs[i]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.compiled import compiled
+from ..core.compiled import compiled, copy_scaled
 from .modes import advance_modes, rest_of_modes
 from .plant import Plant
 from .ports import platen_pose
@@ -44,9 +44,9 @@ def _march(q, tables, ws, dt, substeps, z):
     for k in range(1, q.shape[0]):
         difference(q[k - 1], q[k], axes, step)
         twist = step / dt
-        z[k] = z[k - 1]
+        copy_scaled(1.0, z[k - 1], z[k])
         for i in range(substeps):
-            at[:] = q[k]
+            copy_scaled(1.0, q[k], at)
             if i < substeps - 1:
                 integrate(q[k - 1], (i + 1) / substeps * step, axes, at)
             platen_pose(at, axes, tables.body, ws.frame)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..control.controller import Controller
 from ..core.arrays import Array
-from ..core.compiled import compiled
+from ..core.compiled import compiled, copy_scaled
 from ..core.names import AXES, SAMPLE_RATE
 from ..interfaces.link import Reading
 from ..machine.parameters import Parameters
@@ -57,11 +57,11 @@ def _measure(interface, acceleration, force, out):
     """Fill `Measured.numbers`; the velocity as `instant.motion_at` computes it from pose and twist."""
     frame = np.empty((3, 3))
     rpy_to_matrix(interface[3:6], frame)
-    out[:6] = interface[:6]
+    copy_scaled(1.0, interface[:6], out[:6])
     out[6], out[7], out[8] = from_body(frame, interface[6:9])
     out[9], out[10], out[11] = rpy_rate(frame, interface[9:12])
-    out[12:18] = acceleration
-    out[18:] = force
+    copy_scaled(1.0, acceleration, out[12:18])
+    copy_scaled(1.0, force, out[18:])
 
 
 @compiled

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..control.loop import control_sample
 from ..core.arrays import Array
-from ..core.compiled import compiled, compiled_inline
+from ..core.compiled import compiled, compiled_inline, copy_scaled
 from ..mechanics.forward_dynamics import platen_acceleration
 from ..mechanics.moving_parts import bodies_acceleration
 from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, rates_stage, staggered_stage
@@ -69,12 +69,12 @@ def _accelerate(tables, ws, a):
 @compiled
 def _euler_step(dt, tables, ws, spool):
     motion, q, z = ws.motion, ws.q, ws.z
-    motion[V_SEEN] = motion[V]
+    copy_scaled(1.0, motion[V], motion[V_SEEN])
     status = rates_stage(q, z, tables, ws, spool)
     if status != 0:
         return status
     _accelerate(tables, ws, motion[A])
-    motion[DQ] = dt * motion[V]
+    copy_scaled(dt, motion[V], motion[DQ])
     integrate(q, motion[DQ], tables.axes, q)
     for k in range(motion.shape[1]):
         motion[V, k] += dt * motion[A, k]
@@ -110,16 +110,16 @@ def _rk4_step(dt, tables, ws, spool):
         if n == 6:
             dexp_inverse(motion[DQ], motion[V_SEEN], step)
         else:
-            step[:] = motion[V_SEEN]
+            copy_scaled(1.0, motion[V_SEEN], step)
         _accelerate(tables, ws, dv)
         if stage == 0:
-            motion[A] = dv
+            copy_scaled(1.0, dv, motion[A])
         for k in range(n):
             sum_q[k] += weight * step[k]
             sum_v[k] += weight * dv[k]
         for k in range(z.size):
             sum_z[k] += weight * zd[k]
-    motion[DQ] = dt * sum_q
+    copy_scaled(dt, sum_q, motion[DQ])
     integrate(q, motion[DQ], axes, q)
     for k in range(n):
         motion[V, k] = v0[k] + dt * sum_v[k]
@@ -169,7 +169,7 @@ def run_fused(span, tables, ws, control, signals, log):
     for sample in range(span.first, span.last):
         if span.closed:
             if span.scheme != 0:  # the other schemes leave the ports of their last stage
-                motion[V_SEEN] = motion[V]
+                copy_scaled(1.0, motion[V], motion[V_SEEN])
                 rates_stage(q, ws.z, tables, ws, window[0])
                 _accelerate(tables, ws, motion[A])
             clipped += control_sample(

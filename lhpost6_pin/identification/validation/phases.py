@@ -20,6 +20,7 @@ from ...core.arrays import Array
 from ...core.errors import LhpostError, RecordError
 from ...core.files import shipped
 from ...core.names import AXES, SAMPLE_RATE
+from ...data.quiet_spools import quiet_spools
 from ...data.records import require
 from ...data.signals import differentiate, resample_band_limited
 from ...motions import Reference, Target
@@ -111,8 +112,9 @@ def _inverse_dynamics(test: PreparedTest) -> Phase:
 def _open_loop(test: PreparedTest) -> Phase:
     engine = fastest_engine(test.plant)
     start = None if test.plant.flexible else estimate_start(test.plant, test.test, test.basis.numbers.band.high)
-    machine = test.plant.machine
-    ran, again = (replay(machine, m.record, attrs={}, friction=start, engine=engine) for m in (test.test, test.again))
+    sensors = test.basis.sensors
+    sides = quiet_spools(test.test.record, sensors), quiet_spools(test.again.record, sensors.drawn_twice())
+    ran, again = (replay(test.plant.machine, own, attrs={}, friction=start, engine=engine) for own in sides)
     channels = ("actuator_force", "chamber_pressure_a", "chamber_pressure_b")
     return replace(_of_run(2, SimulatedComparison(test, ran, again), channels), start=start)
 

@@ -1,6 +1,7 @@
 """Exported records hold units in their names and come back the same; the two commands from end to end."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,11 @@ from machine_cases import PRACTICE
 from lhpost6_pin.core.errors import RecordError, UnknownNameError
 from lhpost6_pin.core.names import AXES
 from lhpost6_pin.data.channels import LAYOUT
+from lhpost6_pin.data.check import check_dataset
+from lhpost6_pin.data.filled_samples import filled_samples
 from lhpost6_pin.data.importing import export_record, guess_map, is_export, load_raw, make_imported_record
-from lhpost6_pin.data.records import load_record, make_record
+from lhpost6_pin.data.records import is_measured, load_record, make_record
+from lhpost6_pin.machine.machine import load_machine
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +45,34 @@ def test_an_exported_record_comes_back_without_a_map_to_the_last_bit(tmp_path, r
         np.testing.assert_array_equal(back[name], record[name])
     for key in ("test", "kind", "specimen", "valves_per_horizontal_actuator", "sample_rate_hz"):
         assert back.attrs[key] == record.attrs[key]
+
+
+def test_a_simulated_record_with_noise_comes_back_with_it(tmp_path, record):
+    """Without the attribute it had been taken for one without noise."""
+    noisy = record.assign_attrs(
+        kind="simulated", noise="simulated: usual instruments", machine="LHPOST6", cut="ends in motion"
+    )
+    export_record(noisy, tmp_path / "run.csv", "csv")
+    back = imported(tmp_path / "run.csv")
+    assert is_measured(back)
+    for key in ("kind", "noise", "machine", "cut"):
+        assert back.attrs[key] == noisy.attrs[key]
+
+
+def test_a_gap_that_is_filled_makes_no_finding(tmp_path):
+    """Five channels had been called stuck elsewhere, and a displacement turned, for a gap of 0.2 s in motion."""
+    whole = load_record(PRACTICE)
+    export_record(whole, tmp_path / "run.csv", "csv")
+    lines = (tmp_path / "run.csv").read_text().splitlines(keepends=True)
+    first = next(k for k, line in enumerate(lines) if line[0] not in "#t")
+    (tmp_path / "run.csv").write_text("".join(lines[: first + 3000] + lines[first + 3100 :]))
+    raws = load_raw(tmp_path / "run.csv")
+    channels = guess_map(raws, LABELS).channels
+    filled = replace(channels, test=replace(channels.test, fill_gaps=100))
+    back = make_imported_record(raws, filled, LABELS)
+    assert np.flatnonzero(filled_samples(back)).tolist() == [*range(3000, 3100)]
+    before, after = ([f for f in check_dataset(r, load_machine()) if f.severity != "info"] for r in (whole, back))
+    assert after == before
 
 
 def test_every_column_of_a_table_names_its_unit(tmp_path, record):

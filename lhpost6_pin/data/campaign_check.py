@@ -94,7 +94,7 @@ def check_campaign(machine: Machine, records: Sequence[xr.Dataset], sensors: str
     except RecordError as error:
         reason = str(error)
         if levels.hidden:
-            reason += "; record two seconds of rest before and after each test"
+            reason += "; record two seconds of rest before and after each test, when an earlier motion has settled"
     used = make_sensors(content) if content else None
     if known and (levels.channels or levels.hidden):  # else the records are free of noise
         used = with_measured_noise(known, measured)

@@ -21,6 +21,7 @@ from ..machine.recorded_changes import changes_summary
 from .alignment import hydraulic_force
 from .channels import LAYOUT, channel_name, channel_unit, columns_of, unit_doubt
 from .conditioning import resolution
+from .filled_samples import filled_samples, longest_measured
 from .force_units import wrong_forces
 from .layout_faults import RecordFinding, layout_faults
 from .motion_pairs import GAIN_TOLERANCE, inconsistent_motion
@@ -42,6 +43,7 @@ STILL = 2e-5  # of that span: a channel that moved by more each sample does not 
 SPIKE_NOISE = 20.0  # standard deviations of the roughness: below this a spike and a kink look alike
 SPIKE_EXACT = 1e-3  # of that span, in a record without noise: kinks of friction look like spikes of 1e-4
 RESOLUTION_STEPS = 8  # as many of a channel's smallest steps count as movement
+BEYOND = 1.2  # of a table's stated displacement: less may be an offset
 UNRELATED, FOLLOWS = 0.5, 0.95  # correlations of force and pressures: below, noise or another actuator's; the same
 MOVES = 0.5  # share of the largest variation of its kind from which a force must follow its pressures
 
@@ -67,10 +69,10 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
     if "time" in broken or not known:
         return errors + contents  # signals cannot be judged on a broken time axis
     sound = dataset[[*known]].astype(float).assign_attrs(dataset.attrs)
-    judged = judged_samples(dataset)
+    judged, stretch = judged_samples(dataset) & ~filled_samples(dataset), longest_measured(dataset)
     columns = tuple(c for c in _columns(sound, known, judged) if not _held(c, machine))
     by_column = (_implausible_unit, _starts_in_motion, _saturated_spool, _frozen, _spike)
-    as_recorded = sound
+    as_recorded = sound = sound.isel(time=stretch)
     turned: list[RecordFinding] = []
     signs: list[RecordFinding] = []
     forces: list[RecordFinding] = []
@@ -84,6 +86,7 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
         (warning for judge in by_column for c in columns if (warning := judge(c))),
         _odd_rates(sound),
         inconsistent_motion(sound),
+        _beyond_table(as_recorded, machine),
         _inconsistent_forces(sound, machine),
         _floors_without_mass(sound, machine),
     )
@@ -91,6 +94,18 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
     errors += turned + signs + [f for f in forces if f.severity == "error" and f.channel not in known_signs]
     units = [finding for finding in forces if finding.severity == "warning"]
     return errors + [RecordFinding("warning", *warning) for warning in warnings] + units + contents
+
+
+def _beyond_table(dataset: xr.Dataset, machine: Machine | None) -> Iterator[_Warning]:
+    """Displacements of the platen that the table cannot have."""
+    if machine is None or "platen_displacement" not in dataset:
+        return
+    for k, x in enumerate(columns_of(dataset["platen_displacement"]).T):
+        place, most = int(np.abs(x).argmax()), machine.limits.displacement[k]
+        if 0.0 < BEYOND * most < abs(x[place]):
+            channel = channel_name(dataset["platen_displacement"], k)
+            what = f"is {x[place]:.4g}, {abs(x[place]) / most:.3g} times what {machine.name} can do, {most:.4g}"
+            yield channel, place, what, "check its unit"
 
 
 def _floors_without_mass(dataset: xr.Dataset, machine: Machine | None) -> Iterator[_Warning]:
@@ -156,6 +171,11 @@ class _Column(NamedTuple):
         """Whether it is no sensor's: it may hold still or jump."""
         return LAYOUT[self.channel.split("[")[0]].role == "command"
 
+    @property
+    def is_rate(self) -> bool:
+        """Whether it is a velocity or an acceleration: zero at rest wherever that is."""
+        return "/" in channel_unit(self.channel)
+
 
 def _columns(dataset: xr.Dataset, names: Iterable[str], judged: Mask) -> Iterator[_Column]:
     measured = dataset.attrs.get("kind") == "measured"
@@ -181,12 +201,16 @@ def _implausible_unit(c: _Column) -> _Warning | None:
 
 def _starts_in_motion(c: _Column) -> _Warning | None:
     noise = 1.4826 * float(np.median(np.abs(np.diff(c.x, n=3)))) if len(c.x) > 3 else 0.0  # motion cancels
-    start = float(np.median(c.x[:8]))  # the very first sample bears the filter's edge
+    start, soon = (float(np.median(part)) for part in (c.x[:8], c.x[:64]))  # the very first bears a filter's edge
     moves = channel_unit(c.channel)[0] in "mr" and np.ptp(c.x) > 0
-    if not (moves and abs(start) > START * c.span + START_NOISE * noise + 2 * resolution(c.x)):
+    least = START * c.span + START_NOISE * noise + 2 * resolution(c.x[c.judged])
+    if not (moves and abs(start) > least):
         return None
-    remedy = "begin the record before the motion; subtract the offset"
-    return c.channel, 0, f"starts at {start:.4g}, not at rest in the zero pose", remedy
+    if abs(soon - start) > least or c.is_rate:
+        remedy = "begin the record before the motion" + "; if it was at rest there, subtract the offset" * c.is_rate
+        return c.channel, 0, f"starts at {start:.4g}, not at rest", remedy
+    remedy = "right if the table rested there, parked or held; else an offset: subtract it"
+    return None if c.is_command else (c.channel, 0, f"rests at {start:.4g} at the start, not at zero", remedy)
 
 
 def _saturated_spool(c: _Column) -> _Warning | None:
@@ -207,7 +231,7 @@ def _frozen(c: _Column) -> _Warning | None:
         return (c.channel, 0, what, "check the sensor, or omit the channel") if c.measured else None
     starts = np.concatenate([[0], np.flatnonzero(np.diff(x)) + 1])
     lengths = np.diff(starts, append=len(x))
-    moved = max(RESOLUTION_STEPS * resolution(x), STILL * c.span)
+    moved = max(RESOLUTION_STEPS * resolution(x[c.judged]), STILL * c.span)
     extreme = (x[starts] == x.max()) | (x[starts] == x.min())
     shown = np.add.reduceat(c.judged.astype(int), starts)  # samples of each run in which a sensor shows
     for k in np.flatnonzero(shown >= np.maximum(np.where(extreme, 4, 8), 5 * np.median(lengths))):
@@ -230,7 +254,7 @@ def _spike(c: _Column) -> _Warning | None:
     size = np.abs(rough)
     beside = maximum_filter1d(np.stack([np.roll(size, s) for s in (-10, 10)]), 13, axis=1).max(axis=0)
     floor = STILL if c.measured else SPIKE_EXACT
-    least = max(SPIKE_NOISE * 1.4826 * np.median(size), RESOLUTION_STEPS * resolution(c.x), floor * c.span)
+    least = max(SPIKE_NOISE * 1.4826 * np.median(size), RESOLUTION_STEPS * resolution(c.x[c.judged]), floor * c.span)
     for k in np.flatnonzero(((size > 4 * beside) & (size > least))[3:-3]) + 3:
         if not c.judged[k - 3 : k + 4].all():
             continue

@@ -25,6 +25,10 @@ USUAL_FACTORS = {  # gain of a channel over what it should be -> likely reason
     1e-3: "the other in mm",
     0.0254: "the other in inches",
     np.pi / 180: "the other in degrees",
+    1 / 25.4: "the other in mm, taken for inches",
+    25.4: "in mm, taken for inches",
+    10.0: "in mm, taken for cm",
+    0.1: "the other in mm, taken for cm",
 }
 
 
@@ -37,7 +41,7 @@ def inconsistent_motion(dataset: xr.Dataset) -> Iterator[_Warning]:
             place, source = channel_name(dataset[MOTION[high]], k), channel_name(dataset[MOTION[low]], j)
             if j == k and gain is not None and not right:
                 reason = next((f" ({why}?)" for g, why in USUAL_FACTORS.items() if abs(gain / g - 1) < 0.1), "")
-                yield place, None, f"is {gain:.3g} times that derived from {source}{reason}", "check unit and sign"
+                yield place, None, f"is {gain:.3g} times that derived from {source}{reason}", "check units and signs of both"
             elif j != k and right and gains[k, k] is None:
                 yield place, None, f"is the derivative of {source}", "the two channels may be swapped"
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...core.arrays import Array
+from ...core.arrays import Array, Mask
 from ...core.errors import ParameterError, RecordError
 from ...core.names import AXES
 from ...machine.components import Accelerometer
@@ -16,6 +16,7 @@ from ...mechanics.accelerometers import accelerometer_rows
 from ...mechanics.plant import make_plant
 from ..accelerometers import accelerometer_channel, with_platen_acceleration
 from ..channels import LAYOUT, channel_unit
+from ..filled_samples import FILLED, stated_runs
 from ..records import make_record
 from .channel_map import ChannelMap, channels_of, check_map, find_column, still_channels, with_labels
 from .channel_units import si_factor
@@ -23,6 +24,10 @@ from .raw import RawTest
 from .sampling import Sampling, common_time, fill_holes, resample, uniform
 
 __all__ = ["described_sources", "make_imported_record"]
+
+
+_OF_AN_EXPORT = ("machine", "controller", "noise", "cut", "trip")
+"""Attributes of a record that come back from its export: without `noise` a simulated one would have none."""
 
 
 def make_imported_record(
@@ -51,11 +56,15 @@ def make_imported_record(
     samplings = {file: _sampling(raws[file], channels, most) for file in used}
     time = common_time(list(samplings.values()), channels.test.rate, channels.origin)
     filled = [f"{raws[f].source}: {_runs(s.gaps)}" for f, s in samplings.items() if s.gaps]
+    missing = np.zeros(len(time), bool)
+    for sampling in samplings.values():
+        missing |= _within(time, sampling, sampling.gaps)
     columns: dict[str, Array] = {}
     for name, (file, column) in places.items():
         where, sampling = f"{raws[file].source}, {name} (column {raws[file].names[column]!r})", samplings[file]
         values, holes = fill_holes(_si(raws[file], column, channels, name), most, where)
         filled += [f"{name}: {_runs(holes)}"] * bool(holes)
+        missing |= _within(time, sampling, [(int(sampling.place[k]), count) for k, count in holes])
         everywhere = np.full(len(sampling.time), np.nan)  # with rows that the file lacks
         everywhere[sampling.place] = values
         columns[name] = resample(fill_holes(everywhere, most, where)[0], sampling, time)
@@ -74,6 +83,7 @@ def make_imported_record(
     attrs = _attrs(raws, channels, used)
     if filled:
         attrs["filled"] = "interpolated samples: " + "; ".join(filled)
+        attrs[FILLED] = stated_runs(missing)
     if constant:
         attrs["constant"] = "not measured, stated in the map: " + ", ".join(constant)
     if "point_acceleration" in variables:
@@ -133,6 +143,15 @@ def _runs(runs: Sequence[tuple[int, int]]) -> str:
     return ", ".join(f"{count} from sample {first}" for first, count in runs[:20]) + more
 
 
+def _within(time: Array, sampling: Sampling, runs: Sequence[tuple[int, int]]) -> Mask:
+    """Samples (m,) of a record in runs (first, count) of a file's samples, and those interpolated with their help."""
+    mask = np.zeros(len(time), bool)
+    for first, count in runs:
+        start, end = sampling.time[first], sampling.time[first + count - 1]
+        mask |= (time > start - sampling.step) & (time < end + sampling.step)
+    return mask
+
+
 def _sampling(raw: RawTest, channels: ChannelMap, most: int) -> Sampling:
     if raw.time is not None:
         return uniform(raw.time, most, raw.source)
@@ -170,7 +189,9 @@ def _attrs(raws: Sequence[RawTest], channels: ChannelMap, used: Sequence[int]) -
     test = channels.test
     name = test.name or Path(raws[used[0]].source).stem
     files = "; ".join(f"{Path(raws[k].source).name} ({raws[k].form})" for k in used)
+    exported = [raws[k].facts for k in used if "layout_version" in raws[k].facts]
     return {
+        **{key: facts[key] for facts in reversed(exported) for key in _OF_AN_EXPORT if key in facts},
         "title": name,
         "test": name,
         "kind": test.kind,

@@ -60,7 +60,8 @@ def uniform(time: Array, most_missing: int, where: str) -> Sampling:
         k, count = int(np.argmax(lost > most_missing)), f"{lost.max():.0f}"
         raise RecordError(
             f"{where}, time, sample {k + 1}: {lost[k]:.0f} samples are missing between {time[k]:.9g} s and "
-            f"{time[k + 1]:.9g} s; set fill_gaps = {count} in [test] of the map to interpolate them, or cut the file"
+            f"{time[k + 1]:.9g} s; cut the file there, or set fill_gaps = {count} in [test] of the map to interpolate "
+            "them: they are not measured then, and no sensor is judged by them"
         )
     if lost.sum() + len(time) > _MOST:
         raise RecordError(f"{where}, time: its gaps are {lost.sum():.3g} samples long; cut the file at the longest")

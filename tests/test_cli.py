@@ -363,7 +363,7 @@ def test_commands_of_the_469d_say_why_they_take_no_other_controller(lhpost6, tmp
         (("--frequency", "0"), ("0 Hz lies outside the table's band", "0.07 to 33 Hz")),
         (("--frequency", "0.0001"), ("0.0001 Hz lies outside the table's band",)),
         (("--frequency", "nan"), ("--frequency",)),
-        (("--amplitude", "0"), ("amplitude is 0.0", "above zero")),
+        (("--amplitude", "0"), ("--amplitude 0", "above zero")),
         (("--amplitude", "-1"), ("--amplitude",)),
         (("--amplitude", "10", "--frequency", "5"), ("largest scale that fits",)),
         (("--amplitude", "0.75"), ("largest scale that fits is 0.49", "largest --amplitude that fits is 0.36")),

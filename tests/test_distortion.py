@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lhpost6_pin.data.distortion import Harmonics, harmonics, phase_between, total_harmonic_distortion
+from lhpost6_pin.data.distortion import Harmonics, harmonics, phase_between, total_distortion, total_harmonic_distortion
 
 RATE = 2048.0
 T = np.arange(round(12.3 * RATE)) / RATE
@@ -94,3 +94,12 @@ def test_distortion_is_the_root_of_the_harmonics_power_over_the_fundamental():
 def test_a_record_or_request_that_cannot_be_analysed_is_refused(x, fundamental, count, message):
     with pytest.raises(ValueError, match=message):
         harmonics(x, RATE, fundamental, count)
+
+
+def test_total_distortion_counts_all_that_is_not_the_fundamental():
+    """Harmonics above a band, which the THD of the band leaves out, and a period that is no whole number of samples."""
+    t = np.arange(4000) / 2048.0
+    signal = 0.3 + 2.0 * np.cos(2 * np.pi * 3.3 * t + 0.7)
+    signal += 0.03 * np.cos(2 * np.pi * 40 * 3.3 * t) + 0.04 * np.sin(2 * np.pi * 5 * 3.3 * t)
+    assert total_distortion(signal, 2048.0, 3.3) == pytest.approx(0.05 / 2.0, rel=2e-3)  # period to a sample in 3700
+    assert total_harmonic_distortion(harmonics(signal, 2048.0, 3.3, 10)) == pytest.approx(0.04 / 2.0, rel=2e-3)

@@ -11,6 +11,7 @@ from motions_files import at2_text, cosmos_text, csmip_text
 from lhpost6_pin.core.errors import MotionError
 from lhpost6_pin.motions import AXES, GroundMotion, load_csv, load_motion
 from lhpost6_pin.motions.motion_units import to_si
+from lhpost6_pin.motions.time_steps import uniform_step
 
 GRAVITY = 9.80665
 WAVE = 0.3 * np.sin(np.arange(203) / 7)
@@ -262,3 +263,13 @@ def test_an_equal_unit_in_another_spelling_passes_and_words_that_are_no_unit_giv
         assert motion.samples[1, 0] == pytest.approx(0.5 * GRAVITY)
     with pytest.raises(MotionError, match="'xyzzy' does not fit axis x"):
         load_motion(written(tmp_path, "g.csv", text.format("x_g")), units="xyzzy")
+
+
+@pytest.mark.parametrize(("rate", "form"), [(1024.0, "{:.6g}"), (256.0, "{:.4f}"), (1024.0, "{:.5f}")])
+def test_times_that_are_rounded_stand_for_uniform_ones(rate, form):
+    time = np.arange(12000) / rate
+    rounded = np.array([float(form.format(t)) for t in time])
+    assert uniform_step(rounded, "run.csv") == pytest.approx(1.0 / rate, rel=1e-6)  # a line through 12000 stamps
+    for broken in (np.delete(rounded, 5000), rounded + 0.3 / rate * (np.arange(12000) == 5000)):
+        with pytest.raises(MotionError, match=r"time step before sample 500[01]"):
+            uniform_step(broken, "run.csv")

@@ -210,16 +210,16 @@ def stderr() -> "Console":
 
 
 def print_result(
-    json: bool, entries: Callable[[], Mapping[str, Any]], show: Callable[[], None], files: Sequence[Path] = ()
+    json: bool, entries: Callable[[], Mapping[str, Any]], show: Callable[[], None], files: Sequence[Path] | None = None
 ) -> None:
-    """Print a result and the files written: its entries as JSON alone, or by `show`."""
+    """Print a result and the files written, if the command writes any: its entries as JSON alone, or by `show`."""
     from ..core.jsonable import as_json
 
     if json:
-        typer.echo(as_json({**entries(), "files": files} if files else entries()))
+        typer.echo(as_json({**entries(), "files": files} if files is not None else entries()))
         return
     show()
-    for path in files:
+    for path in files or ():
         typer.echo(f"wrote {path}")
 
 

@@ -192,9 +192,8 @@ def _amplitude(text: str, axis: str) -> float:
 
     unit = "m" if axis in AXES[:3] else "rad"
     numbers = numbers_in(text, unit)
-    if numbers is None or len(numbers) > 1:
+    if numbers is None or len(numbers) > 1 or not numbers[0] > 0.0:
         example = "50mm" if unit == "m" else "1deg"
-        raise MotionError(
-            f"--amplitude {text}: give one number in {unit}, or with a unit of the same kind, as {example}"
-        )
+        what = f"give one number above zero, in {unit} or with a unit of the same kind, as {example}"
+        raise MotionError(f"--amplitude {text}: {what}")
     return numbers[0]

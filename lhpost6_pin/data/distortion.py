@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..core.arrays import Array
 
-__all__ = ["Harmonics", "harmonics", "phase_between", "total_harmonic_distortion"]
+__all__ = ["Harmonics", "harmonics", "phase_between", "total_distortion", "total_harmonic_distortion"]
 
 
 class Harmonics(NamedTuple):
@@ -51,6 +51,19 @@ def total_harmonic_distortion(h: Harmonics) -> float:
     """Amplitude of all harmonics together over that of the fundamental [1]; NaN if there is no fundamental."""
     first, *rest = h.amplitude
     return float(np.linalg.norm(rest) / first) if first > 0 else float("nan")
+
+
+def total_distortion(signal: ArrayLike, rate: float, fundamental: float) -> float:
+    """RMS of all but the fundamental over that of the fundamental [1], at all frequencies; NaN without a fundamental.
+
+    Over the longest whole number of last periods of `signal` (n,), as `harmonics`, whose errors it raises.
+    """
+    x, first = np.asarray(signal, dtype=float), harmonics(signal, rate, fundamental, 1)
+    used = min(len(x), int(np.ceil(int(len(x) * fundamental / rate + 1e-9) * rate / fundamental - 1e-6)))
+    time = np.arange(len(x) - used, len(x)) / rate
+    rest = x[-used:] - first.amplitude[0] * np.cos(2 * np.pi * fundamental * time + first.phase[0])
+    size = float(first.amplitude[0])
+    return float(np.sqrt(2.0) * rest.std() / size) if size > 0 else float("nan")
 
 
 def phase_between(reference: Harmonics, signal: Harmonics) -> float:

@@ -41,7 +41,12 @@ def inconsistent_motion(dataset: xr.Dataset) -> Iterator[_Warning]:
             place, source = channel_name(dataset[MOTION[high]], k), channel_name(dataset[MOTION[low]], j)
             if j == k and gain is not None and not right:
                 reason = next((f" ({why}?)" for g, why in USUAL_FACTORS.items() if abs(gain / g - 1) < 0.1), "")
-                yield place, None, f"is {gain:.3g} times that derived from {source}{reason}", "check units and signs of both"
+                yield (
+                    place,
+                    None,
+                    f"is {gain:.3g} times that derived from {source}{reason}",
+                    "check units and signs of both",
+                )
             elif j != k and right and gains[k, k] is None:
                 yield place, None, f"is the derivative of {source}", "the two channels may be swapped"
 

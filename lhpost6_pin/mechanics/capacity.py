@@ -80,6 +80,9 @@ def capacity_table(machine: Machine, valves: int = 0) -> tuple[Capacity, ...]:
     open_valves = machine.with_valves(valves) if valves else with_all_valves(machine)
     rows = [*_forces(plant), *_accelerations(plant), *_speeds(open_valves), *_travel(plant)]
     stated = _stated(machine)
+    if not printed and "peak acceleration Z down" in stated:  # one limit for both directions: of the weaker one
+        weaker = min((row for row in rows if row.name.startswith("peak acceleration Z ")), key=lambda row: row.model)
+        stated[weaker.name] = stated.pop("peak acceleration Z down")
     if printed and valves not in (0, ALL_VALVES):
         stated = {name: value for name, value in stated.items() if "velocity" not in name}
     return tuple(row._replace(printed=stated.get(row.name)) for row in rows)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..core.errors import MotionError
+from ..core.rounding import rounding_of
 
 __all__ = ["even_out", "uniform_step"]
 
@@ -21,6 +22,13 @@ def uniform_step(time: np.ndarray, where: str, stated: float | None = None) -> f
     if not (np.isfinite(mean) and mean > 0):
         raise MotionError(f"{where}: time runs from {time[0]:g} s to {time[-1]:g} s; it must increase")
     if uneven.any():
+        rounding = np.minimum(rounding_of(time), 0.25 * usual)
+        if step := _rounded_step(time, np.maximum(rounding, _UNIFORM * usual)):
+            mean, uneven = step, np.zeros(1, bool)
+        else:
+            beyond = np.abs(np.diff(time) - usual) > np.maximum(rounding[1:] + rounding[:-1], _UNIFORM * usual)
+            uneven = beyond if beyond.any() else uneven
+    if uneven.any():
         sample = int(np.argmax(uneven)) + 1
         here, before = float(time[sample]), float(time[sample - 1])
         raise MotionError(
@@ -30,6 +38,13 @@ def uniform_step(time: np.ndarray, where: str, stated: float | None = None) -> f
     if stated is not None and not abs(stated - mean) <= _UNIFORM * mean:
         raise MotionError(f"{where}: its time column has steps of {mean:g} s, not {stated:g} s; leave --dt out")
     return float(mean)
+
+
+def _rounded_step(time: np.ndarray, rounding: np.ndarray) -> float:
+    """Step [s] of times (n,) that are uniform but for a `rounding` (n,) of their digits; zero of others."""
+    count = np.arange(len(time))
+    step, start = np.polyfit(count, time - time[0], 1)
+    return float(step) if (np.abs(time - time[0] - start - step * count) <= rounding).all() else 0.0
 
 
 def even_out(time: np.ndarray, values: np.ndarray, where: str) -> tuple[float, np.ndarray]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..studies.exceedance import Exceedance
+from ..studies.exceedance import ANY, Exceedance
 from ..studies.summary import Configuration, EnsembleSummary, ImportanceOf, Spread
 from .report.page import Table, number
 from .report.scales import SCALES, Scale
@@ -53,6 +53,8 @@ def _risk_words(one: Exceedance, found: EnsembleSummary) -> str:
     """The scale of the stated risk, or with one scale the share beyond a limit, in words."""
     if math.isnan(one.risk_scale):
         return f"{one.limit.capitalize()}: demand unknown"
+    if len(one.critical) == 1:
+        return _of_one_machine(one, found)
     if len(found.scales) == 1:
         share = f"{_percent(one.share[0])} ({_percent(one.low[0])} to {_percent(one.high[0])})"
         return f"At scale {found.scales[0]:g}, {share} of the runs reach {one.limit}"
@@ -69,6 +71,18 @@ def _risk_words(one: Exceedance, found: EnsembleSummary) -> str:
     return f"{risk} at scale {one.risk_scale:.3g} ({low}{_end(one.risk_high)})"
 
 
+def _of_one_machine(one: Exceedance, found: EnsembleSummary) -> str:
+    """Where the only machine reaches a limit; no risk can be stated of it."""
+    scale, (least, *_, most) = float(one.critical[0]), (*found.scales, found.scales[-1])
+    where = f"at scale {scale:.3g}"
+    if math.isinf(scale):
+        where = f"at no scale up to {most:g}, the largest run"
+    elif scale <= least:
+        where = f"at scale {least:g} already, the smallest run"
+    limit = "a limit" if one.limit == ANY else one.limit
+    return f"The machine as stated reaches {limit} {where}: a risk is that of many (--machines)"
+
+
 def _end(scale: float) -> str:
     return "beyond the largest" if math.isinf(scale) else f"{scale:.3g}"
 
@@ -78,8 +92,9 @@ def risk_table(found: EnsembleSummary) -> Table:
     rows, varying = [], [k for k in range(3) if len({own[k] for own in found.configurations}) > 1]
     for own in found.configurations:
         for one in own.exceedances:
+            alone = len(one.critical) == 1
             shares = (
-                f"{_percent(s)} ({_percent(a)} to {_percent(b)})"
+                ("reached" if s else "–") if alone else f"{_percent(s)} ({_percent(a)} to {_percent(b)})"
                 for s, a, b in zip(one.share, one.low, one.high, strict=True)
             )
             below = "≤ " if one.where == "at or below the smallest run" else ""
@@ -87,7 +102,9 @@ def risk_table(found: EnsembleSummary) -> Table:
             scale = below + _end(one.risk_scale) if one.where != "unknown" else "–"
             rows.append((one.limit, *(str(own[k]) for k in varying), scale, len(one.critical), *shares))
     names = ("Motion", "Specimen", "Controller")
-    header = ("Limit", *(names[k] for k in varying), f"Scale of {_percent(found.level)} risk", "Machines")
+    alone = all(len(one.critical) <= 1 for own in found.configurations for one in own.exceedances)
+    at = "Scale at which it is reached" if alone else f"Scale of {_percent(found.level)} risk"
+    header = ("Limit", *(names[k] for k in varying), at, "Machines")
     return Table("Exceedance of limits", (*header, *(f"Scale {s:g}" for s in found.scales)), rows)
 
 

@@ -68,7 +68,7 @@ def print_iterations(result: Iterated, loop: Mapping[str, Any]) -> None:
 def print_sine(test: SineTest, loop: Mapping[str, Any]) -> None:
     """Print the verdict, amplitude, phase and distortion without and with cancellers."""
     amplitude = f"{test.amplitude:g} {'m' if test.axis in 'xyz' else 'rad'}"
-    what = f"{amplitude} at {test.frequency:g} Hz in {test.axis}; distortion over all harmonics to 33 Hz"
+    what = f"{amplitude} at {test.frequency:g} Hz in {test.axis}"
     print_blocks(sine_verdict(test, loop)[0], what, sine_table(test))
 
 

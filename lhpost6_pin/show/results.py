@@ -162,7 +162,7 @@ def iteration_entries(found: "Iterated") -> Entries:
 
 def sine_entries(found: "SineTest") -> Entries:
     """Amplitude, phase and distortion without and with the cancellers."""
-    names = ("amplitude_error", "phase_error", "distortion", "distortion_displacement", "peak_spool")
+    names = ("amplitude_error", "phase_error", "distortion", "distortion_all", "distortion_displacement", "peak_spool")
 
     results = {"alone": found.before, "with_cancellers": found.after}
     both = {when: {**_picked(one, *names), "clipped": one.run.clipped} for when, one in results.items()}

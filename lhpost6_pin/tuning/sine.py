@@ -24,7 +24,7 @@ from ..core.names import AXES, SAMPLE_RATE
 from ..core.progress import Progress
 from ..core.rounding import rounded_down
 from ..core.shown import Shown
-from ..data.distortion import Harmonics, harmonics, phase_between, total_harmonic_distortion
+from ..data.distortion import Harmonics, harmonics, phase_between, total_distortion, total_harmonic_distortion
 from ..machine.machine import Machine
 from ..mechanics.plant import Plant
 from ..mechanics.pose import platen_motion
@@ -55,7 +55,8 @@ class SineResult:
     acceleration: Harmonics
     amplitude_error: float  # of the displacement's fundamental [1]
     phase_error: float  # of the same [rad], negative for a lag
-    distortion: float  # total harmonic distortion of the acceleration [1]
+    distortion: float  # total harmonic distortion of the acceleration in the band of the table [1]
+    distortion_all: float  # of the acceleration, at all frequencies [1]
     distortion_displacement: float
     peak_spool: float  # largest command [1]
 
@@ -214,6 +215,7 @@ def _evaluate(run: Run, target: Target, k: int, frequency: float, measured: slic
         amplitude_error=float(displacement.amplitude[0] / wanted.amplitude[0] - 1.0),
         phase_error=phase_between(wanted, displacement),
         distortion=total_harmonic_distortion(acceleration),
+        distortion_all=total_distortion(motion.acceleration[measured, k], float(SAMPLE_RATE), frequency),
         distortion_displacement=total_harmonic_distortion(displacement),
         peak_spool=run.peak_command,
     )

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ...core.arrays import Array
 from ...core.errors import RecordError
+from ...core.rounding import rounding_of
 from ..layout_faults import STEP_TOLERANCE
 from ..signals import lowpass_zero_phase, resample_band_limited
 
@@ -17,8 +18,6 @@ Indices = NDArray[np.intp]
 
 _SAME_TIME = 1e-6  # of one sample: two clocks that differ by less are the same
 _ANTI_ALIAS = (0.4, 16)  # cutoff of the new rate, order: 1 % lost at 0.3 of the rate, 0.2 % left at 0.6
-_FEWEST_DIGITS, _MOST_DIGITS = 4, 9
-_WHOLE = 1e-4  # of the last digit: a number so near to a whole one is that
 _MOST = 2**24  # samples: more than two hours at 2048 Hz
 _LONGEST = 1e12  # [s]: seconds since any usual epoch are far fewer
 
@@ -68,7 +67,7 @@ def uniform(time: Array, most_missing: int, where: str) -> Sampling:
     place = np.concatenate([[0], np.cumsum(lost + 1)]).astype(np.intp)
     step, start = np.polyfit(place, time - time[0], 1)
     off = np.abs(time - time[0] - start - step * place)
-    beyond = off - np.maximum(STEP_TOLERANCE * step, _written_to(time))
+    beyond = off - np.maximum(STEP_TOLERANCE * step, rounding_of(time))
     if (beyond > 0).any():
         k = int(np.argmax(beyond))
         raise RecordError(
@@ -77,23 +76,6 @@ def uniform(time: Array, most_missing: int, where: str) -> Sampling:
         )
     gaps = tuple((int(place[k]) + 1, int(lost[k])) for k in np.flatnonzero(lost))
     return Sampling(time[0] + start + step * np.arange(place[-1] + 1), place, gaps)
-
-
-def _written_to(time: Array) -> Array:
-    """Largest rounding errors (n,) [s] of stamps as they are written: in single precision, to decimals, to digits."""
-    if np.array_equal(time, time.astype(np.float32)):
-        return np.full(len(time), np.spacing(np.float32(np.abs(time).max())), float)
-    bound = np.zeros(len(time))
-    for decimals in range(_MOST_DIGITS):
-        if np.allclose(time, np.round(time, decimals), rtol=0, atol=1e-6 * 10.0**-decimals):
-            bound += 0.51 * 10.0**-decimals
-            break
-    size = np.floor(np.log10(np.maximum(np.abs(time), 10.0**-_MOST_DIGITS)))
-    for digits in range(_FEWEST_DIGITS, _MOST_DIGITS):  # as %g writes: fewer decimals from 1, 10, 100 s on
-        last = 10.0 ** (size - digits + 1)
-        if (np.abs(time / last - np.rint(time / last)) <= _WHOLE).all():
-            return np.maximum(bound, 0.51 * last)
-    return bound
 
 
 def fill_holes(values: Array, most: int, where: str) -> tuple[Array, tuple[tuple[int, int], ...]]:

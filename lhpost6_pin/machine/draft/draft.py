@@ -213,20 +213,24 @@ def _limits(
         moved[k] = travel * largest_travel(legs, stroke, [k] if free else axes)
         fast[k] = speed / levers[:, k].max()
         weight = inertia[2] * basis.rule("platen.gravity") if k == 2 else 0.0
-        usable = share * (forces[0] if k == 2 else min(forces)) * levers[:, k].sum()
+        push, pull = (share * force * levers[:, k].sum() for force in forces)
+        usable = push if k == 2 else min(push, pull)
         if usable <= weight:
             raise ParameterError(
                 f"--mass: {weight / 1e3:.4g} kN to be carried, and {share:g} of the actuators' force is "
                 f"{usable / 1e3:.4g} kN; check --mass, --area and --supply-pressure"
             )
-        strong[k] = (usable - weight) / inertia[k]
+        strong[k] = min(usable - weight, pull + weight) / inertia[k]  # the weight helps downwards
+    admitted = f"{f'{travel:g} of what ' if free else ''}the actuators' stroke admits"
+    if not free and len(axes) > 1:
+        admitted += ", all axes at their ends at once"
     reasons = {
-        "displacement": (moved, "m | rad", f"{f'{travel:g} of what ' if free else ''}the actuators' stroke admits"),
+        "displacement": (moved, "m | rad", admitted),
         "velocity": (fast, "m/s | rad/s", "speed of the actuators without load, over their lever"),
         "acceleration": (
             strong,
             "m/s2 | rad/s2",
-            f"{share:g} of the actuators' force, less the weight, over the inertia",
+            f"{share:g} of the actuators' force, less the weight upwards, over the inertia",
         ),
     }
     found = {

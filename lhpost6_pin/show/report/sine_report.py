@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...core.names import AXES
+from ...tuning.identify import tuning_numbers
 from ...tuning.sine import SineResult, SineTest
 from .control_blocks import assumption_blocks, load_of, loop_sentence
 from .page import Headline, Level, Page, Section, Table, number, save_page
@@ -118,21 +119,31 @@ def sine_verdict(test: SineTest, loop: Mapping[str, Any]) -> tuple[str, Level]:
 def _change_of_distortion(test: SineTest) -> tuple[str, bool]:
     """The sentence on the distortion of the acceleration without and with cancellers; whether it rises by much."""
     before, after = test.before.distortion, test.after.distortion
-    what, halved = "The distortion of the acceleration", _reached(test)[2]
+    what, halved = f"The distortion of the acceleration {_band()}", _reached(test)[2]
+    everywhere = (
+        f"at all frequencies it is {percent(test.before.distortion_all)} and {percent(test.after.distortion_all)}"
+    )
     if not np.isfinite([before, after]).all():
         return f"{what} is not judged: {percent(before)} without, {percent(after)} with them.", False
     if after < before:
         by = "half or more" if halved else "less than half"
-        return f"{what} falls from {percent(before)} to {percent(after)}, by {by}.", False
+        return f"{what} falls from {percent(before)} to {percent(after)}, by {by}; {everywhere}.", False
     by = f", by a factor of {number(after / before)}" if before > 0.0 else ""
-    return f"{what} rises from {percent(before)} to {percent(after)}{by}.", after > DISTORTION_RISEN * before
+    return (
+        f"{what} rises from {percent(before)} to {percent(after)}{by}; {everywhere}.",
+        after > DISTORTION_RISEN * before,
+    )
 
 
 def _headlines(test: SineTest) -> list[Headline]:
     tiles = (
         ("Amplitude error with cancellers", lambda found: _share(found.amplitude_error), ""),
         ("Phase error with cancellers", lambda found: _angle(found.phase_error), "; negative is late"),
-        ("Distortion (THD) of the acceleration with cancellers", lambda found: percent(found.distortion), ""),
+        (
+            f"Distortion (THD {_band()}) of the acceleration with cancellers",
+            lambda found: percent(found.distortion),
+            f"; at all frequencies {percent(test.after.distortion_all)}",
+        ),
     )
     return [
         Headline(shown(test.after), label, f"without {shown(test.before)}{note}", "good" if met else "attention")
@@ -146,8 +157,9 @@ def sine_table(test: SineTest) -> Table:
     quantities: dict[str, Callable[[SineResult], str]] = {
         "Amplitude error of the displacement": lambda r: _share(r.amplitude_error),
         "Phase error of the displacement": lambda r: _angle(r.phase_error),
-        "THD of the acceleration": lambda r: percent(r.distortion),
-        "THD of the displacement": lambda r: percent_of_fundamental(100.0 * r.distortion_displacement),
+        f"THD of the acceleration {_band()}": lambda r: percent(r.distortion),
+        "Distortion of the acceleration, all frequencies": lambda r: percent(r.distortion_all),
+        f"THD of the displacement {_band()}": lambda r: percent_of_fundamental(100.0 * r.distortion_displacement),
         "Peak acceleration, cycles measured": lambda r: shown_as(_peak(test, r), axis_scale(test.axis, "acceleration")),
         "Largest acceleration error, cycles measured": lambda r: _largest(test, r, test.measured),
         "Largest acceleration error, fading out": lambda r: _largest(test, r, fading),
@@ -157,6 +169,11 @@ def sine_table(test: SineTest) -> Table:
     rows = [(name, shown(test.before), shown(test.after)) for name, shown in quantities.items()]
     caption = "Amplitude and phase of the fundamental, THD = √(Σ harmonics²) ∕ fundamental"
     return Table(caption, ("", "Controller alone", "With APC and AHC"), rows)
+
+
+def _band() -> str:
+    """The band in which harmonics are counted, in words."""
+    return f"to {tuning_numbers().number('feedforward_targets.high'):g} Hz"
 
 
 def _peak(test: SineTest, found: SineResult) -> float:

@@ -270,6 +270,7 @@ def test_times_that_are_rounded_stand_for_uniform_ones(rate, form):
     time = np.arange(12000) / rate
     rounded = np.array([float(form.format(t)) for t in time])
     assert uniform_step(rounded, "run.csv") == pytest.approx(1.0 / rate, rel=1e-6)  # a line through 12000 stamps
-    for broken in (np.delete(rounded, 5000), rounded + 0.3 / rate * (np.arange(12000) == 5000)):
+    late = float(form.format(time[5000] + 0.3 / rate))
+    for broken in (np.delete(rounded, 5000), np.where(np.arange(12000) == 5000, late, rounded)):
         with pytest.raises(MotionError, match=r"time step before sample 500[01]"):
             uniform_step(broken, "run.csv")

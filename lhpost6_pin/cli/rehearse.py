@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..core.errors import ParameterError, SimulationError
+from ..core.errors import ParameterError, RecordError, SimulationError
 from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
@@ -138,7 +138,9 @@ def open_loop(
     json: opt.Json = False,
 ) -> None:
     """Drive the plant by recorded spools from recorded pressures (open loop); writes record.nc and report.html."""
-    from ..data.records import load_record
+    from ..data.measured_sensors import find_sensors
+    from ..data.quiet_spools import quiet_spools
+    from ..data.records import is_measured, load_record
     from ..simulation.rehearse import replay
 
     bare = machine.load_bare()
@@ -151,8 +153,14 @@ def open_loop(
     attrs = {"test": name, "title": f"{test}, open loop", "source": f"spools of {record}"}
     if (made := str(measured.attrs.get("specimen", table.mounted))) != table.mounted:
         log.warning("%s: was recorded with specimen %s, this run has %s", record, made, table.mounted)
+    driving = measured
+    if is_measured(measured):
+        try:
+            driving = quiet_spools(measured, find_sensors(table, [measured]))
+        except RecordError as error:
+            log.warning("the noise of the spools is not known, and drives the model with them: %s", error)
     with progress_bar(f"{name} on {table.name}") as progress:
-        simulated = replay(table, measured, attrs=attrs, progress=progress, **options)
+        simulated = replay(table, driving, attrs=attrs, progress=progress, **options)
     save_run(simulated, folder, json, against=measured)
 
 

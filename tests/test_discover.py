@@ -28,7 +28,15 @@ from lhpost6_pin.discovery.candidates import Candidate, list_candidates, list_re
 from lhpost6_pin.discovery.checkpoint import make_checkpoint
 from lhpost6_pin.discovery.contest import _apart, _complexity, _needless, _settled, loss_without
 from lhpost6_pin.discovery.discover import _hash, _sourced, discovery_numbers
-from lhpost6_pin.discovery.estimates import Absorbing, absorbing, amplitude_of, at_bounds, is_absorbed, moved_together
+from lhpost6_pin.discovery.estimates import (
+    Absorbing,
+    Estimate,
+    absorbing,
+    amplitude_of,
+    at_bounds,
+    is_absorbed,
+    moved_together,
+)
 from lhpost6_pin.discovery.floor import expected_gaps, model_at
 from lhpost6_pin.discovery.held_out import prove
 from lhpost6_pin.discovery.joint_fit import _best_strength, fit_from_rival, fit_jointly, refined, with_candidate
@@ -323,6 +331,27 @@ def test_a_part_of_what_may_be_due_to_a_form_may_be_so_too():
         scored("stribeck_friction", ("H2",), 140.0),
     ]
     assert [one.refused for one in _without_parts([whole, *others])] == [FORM, FORM, "", "", ""]
+
+
+@pytest.mark.parametrize(
+    ("motion", "gain", "least", "why"),
+    [
+        ("free", 169.0, -0.005, "zero"),  # two blind cases named such a curve of flow beside leakages
+        ("free", 169.0, 0.0001, None),
+        ("free", 2791.0, -0.005, None),  # its numbers go together: none is known alone, all are needed
+        ("x", 2791.0, -0.005, "zero"),
+    ],
+)
+def test_an_effect_that_may_be_zero_beside_a_far_stronger_one_is_none(motion, gain, least, why):
+    machine = load_machine()
+    curve = next(c for group in list_candidates(machine) for c in group if c.family.name == "flow_curve_error")
+    added = [SimpleNamespace(candidate=curve, gain=gain), SimpleNamespace(candidate=None, gain=9663.0)]
+    found = SimpleNamespace(
+        added=added, numbers=discovery_numbers()[0], problem=SimpleNamespace(machine=SimpleNamespace(motion=motion))
+    )
+    size = Estimate(0.001, "1", least, 0.002)
+    told = withdrawal._by_estimate(found, added[0], (), {amplitude_of(added[0]): size})
+    assert (told and told.why) == why
 
 
 def test_families_that_friction_of_another_form_passes_for_must_gain_more():

@@ -5,7 +5,8 @@ that may be another form of friction, where the report's friction on its compone
 where few sensors leave much to be confused, it is none either with any of its numbers at a bound, if it cannot be
 distinguished from zero, or if it is no more than what the form of friction may be off by; there effects are removed one
 by one, with everything else refitted. A platform on legs is judged with all effects in place, but of two that pass for
-each other the second without the first.
+each other the second without the first; an effect that cannot be distinguished from zero is none there beside a far
+stronger one.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -89,11 +90,17 @@ def _by_estimate(
     if family.confusable and (ran := _own_friction(found, one, bounded)):
         return Withdrawn(name, family.named, "friction", ran)
     amplitude = estimates[size]
-    if guided and not one.candidate.release and amplitude.low <= 0.0 <= amplitude.high:
+    if amplitude.low <= 0.0 <= amplitude.high and not one.candidate.release and (guided or _is_small(found, one)):
         return Withdrawn(name, family.named, "zero")
     if guided and family.confusable and amplitude.unit == "N" and abs(amplitude.value) < _form_error(found, one):
         return Withdrawn(name, family.named, "own_form")
     return None
+
+
+def _is_small(found: Search, one: AddedEffect) -> bool:
+    """Whether an effect gains little beside another: what the form of that one leaves may look like it."""
+    others = (other.gain for other in found.added if other is not one)
+    return one.gain < found.numbers.number("verdict.beside") * max(others, default=0.0)
 
 
 def _own_friction(found: Search, one: AddedEffect, bounded: Sequence[str]) -> tuple[str, ...]:

@@ -368,7 +368,8 @@ def test_an_effect_on_guides_that_its_own_numbers_reject_is_no_finding(table, sh
     value, low, high = (friction * f for f in (share, share - half, share + half))
     estimates = {SIZE: Estimate(value, "N", low, high)}
     for machine in (table, load_machine()):
-        found = SimpleNamespace(problem=SimpleNamespace(machine=machine), solution=None, numbers=discovery_numbers()[0])
+        problem = SimpleNamespace(machine=machine)
+        found = SimpleNamespace(problem=problem, solution=None, numbers=discovery_numbers()[0], added=(ADDED,))
         free = None if SIZE not in bounds else "at_bound"  # on legs the size alone
         wanted = why if machine is table else free
         assert why_withdrawn(withdrawal._by_estimate, found, ADDED, bounds, estimates, **given) == wanted

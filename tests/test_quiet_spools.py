@@ -29,6 +29,8 @@ def test_spools_without_a_stated_noise_are_left_alone():
     record, sensors = load_record(PRACTICE), load_sensors("lhpost6")
     bare = quiet_spools(record.drop_vars("spool_position"), sensors)
     assert "spool_position" not in bare
+    clean = record.assign_attrs(kind="simulated")
+    assert quiet_spools(clean, sensors) is clean
     assert quiet_spools(record, sensors.__class__(**{**vars(sensors), "noise": {}})) is record
 
 

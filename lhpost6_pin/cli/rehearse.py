@@ -154,7 +154,7 @@ def open_loop(
     if (made := str(measured.attrs.get("specimen", table.mounted))) != table.mounted:
         log.warning("%s: was recorded with specimen %s, this run has %s", record, made, table.mounted)
     driving = measured
-    if is_measured(measured):
+    if is_measured(measured):  # else the sensors need not be known
         try:
             driving = quiet_spools(measured, find_sensors(table, [measured]))
         except RecordError as error:

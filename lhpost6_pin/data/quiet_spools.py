@@ -12,6 +12,7 @@ import xarray as xr
 
 from ..core.files import models_folder
 from ..machine.parameters import load_parameters
+from .records import is_measured
 from .sensors import SensorSet
 from .signals import local_wiener
 
@@ -21,7 +22,9 @@ SPOOLS = ("spool_position", "spool_position_b")
 
 
 def quiet_spools(record: xr.Dataset, sensors: SensorSet) -> xr.Dataset:
-    """The record with its spools less the noise that the sensors state; the record itself where they state none."""
+    """The record with its spools less the noise that the sensors state; itself without noise, stated or in the record."""
+    if not is_measured(record):
+        return record
     time = record["time"].values
     dt = float(time[-1] - time[0]) / max(len(time) - 1, 1)
     quiet = {}

@@ -22,7 +22,7 @@ SPOOLS = ("spool_position", "spool_position_b")
 
 
 def quiet_spools(record: xr.Dataset, sensors: SensorSet) -> xr.Dataset:
-    """The record with its spools less the noise that the sensors state; itself without noise, stated or in the record."""
+    """The record with its spools less the noise that sensors state; itself where none is stated, or it is simulated."""
     if not is_measured(record):
         return record
     time = record["time"].values

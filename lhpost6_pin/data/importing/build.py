@@ -26,7 +26,7 @@ from .sampling import Sampling, common_time, fill_holes, resample, uniform
 __all__ = ["described_sources", "make_imported_record"]
 
 
-_OF_AN_EXPORT = ("machine", "controller", "noise", "cut", "trip")
+_OF_AN_EXPORT = ("machine", "controller", "noise", "cut", "trouble")
 """Attributes of a record that come back from its export: without `noise` a simulated one would have none."""
 
 

@@ -35,16 +35,21 @@ def harmonics(signal: ArrayLike, rate: float, fundamental: float, count: int) ->
         raise ValueError("the signal must be one column of finite samples")
     if not (fundamental > 0 and count >= 1 and 2 * count * fundamental < rate):
         raise ValueError(f"{count} harmonics of {fundamental:g} Hz do not lie between 0 and {rate / 2:g} Hz")
-    periods = int(len(x) * fundamental / rate + 1e-9)
-    if periods < 1:
+    used = _whole_periods(len(x), rate, fundamental)
+    if used == 0:
         raise ValueError(f"{len(x) / rate:g} s are less than one period of {fundamental:g} Hz")
-    used = min(len(x), int(np.ceil(periods * rate / fundamental - 1e-6)))  # more samples than unknowns
     frequency = np.linspace(fundamental, count * fundamental, count)
     angle = 2 * np.pi * np.multiply.outer(np.arange(len(x) - used, len(x)) / rate, frequency)
     waves = np.hstack([np.cos(angle), np.sin(angle), np.ones((used, 1))])
     weights = np.linalg.lstsq(waves, x[-used:], rcond=None)[0]
     cosine, sine = weights[:count], weights[count : 2 * count]
     return Harmonics(frequency, np.hypot(cosine, sine), np.arctan2(-sine, cosine))
+
+
+def _whole_periods(samples: int, rate: float, fundamental: float) -> int:
+    """Samples of the longest whole number of periods, rounded up: more than the unknowns of as many harmonics."""
+    periods = int(samples * fundamental / rate + 1e-9)
+    return min(samples, int(np.ceil(periods * rate / fundamental - 1e-6))) if periods else 0
 
 
 def total_harmonic_distortion(h: Harmonics) -> float:
@@ -59,7 +64,7 @@ def total_distortion(signal: ArrayLike, rate: float, fundamental: float) -> floa
     Over the longest whole number of last periods of `signal` (n,), as `harmonics`, whose errors it raises.
     """
     x, first = np.asarray(signal, dtype=float), harmonics(signal, rate, fundamental, 1)
-    used = min(len(x), int(np.ceil(int(len(x) * fundamental / rate + 1e-9) * rate / fundamental - 1e-6)))
+    used = _whole_periods(len(x), rate, fundamental)
     time = np.arange(len(x) - used, len(x)) / rate
     rest = x[-used:] - first.amplitude[0] * np.cos(2 * np.pi * fundamental * time + first.phase[0])
     size = float(first.amplitude[0])

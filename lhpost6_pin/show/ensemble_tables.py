@@ -73,7 +73,7 @@ def _risk_words(one: Exceedance, found: EnsembleSummary) -> str:
 
 def _of_one_machine(one: Exceedance, found: EnsembleSummary) -> str:
     """Where the only machine reaches a limit; no risk can be stated of it."""
-    scale, (least, *_, most) = float(one.critical[0]), (*found.scales, found.scales[-1])
+    scale, least, most = float(one.critical[0]), found.scales[0], found.scales[-1]
     where = f"at scale {scale:.3g}"
     if math.isinf(scale):
         where = f"at no scale up to {most:g}, the largest run"
@@ -92,20 +92,23 @@ def risk_table(found: EnsembleSummary) -> Table:
     rows, varying = [], [k for k in range(3) if len({own[k] for own in found.configurations}) > 1]
     for own in found.configurations:
         for one in own.exceedances:
-            alone = len(one.critical) == 1
-            shares = (
-                ("reached" if s else "–") if alone else f"{_percent(s)} ({_percent(a)} to {_percent(b)})"
-                for s, a, b in zip(one.share, one.low, one.high, strict=True)
-            )
             below = "≤ " if one.where == "at or below the smallest run" else ""
             below = f"{one.risk_after:.3g} to " if one.risk_after else below
             scale = below + _end(one.risk_scale) if one.where != "unknown" else "–"
-            rows.append((one.limit, *(str(own[k]) for k in varying), scale, len(one.critical), *shares))
+            rows.append((one.limit, *(str(own[k]) for k in varying), scale, len(one.critical), *_shares(one)))
     names = ("Motion", "Specimen", "Controller")
     alone = all(len(one.critical) <= 1 for own in found.configurations for one in own.exceedances)
     at = "Scale at which it is reached" if alone else f"Scale of {_percent(found.level)} risk"
     header = ("Limit", *(names[k] for k in varying), at, "Machines")
     return Table("Exceedance of limits", (*header, *(f"Scale {s:g}" for s in found.scales)), rows)
+
+
+def _shares(one: Exceedance) -> list[str]:
+    """Share of machines that reach a limit at each scale, with its interval; of one machine whether it does."""
+    if len(one.critical) == 1:
+        return ["reached" if share else "–" for share in one.share]
+    each = zip(one.share, one.low, one.high, strict=True)
+    return [f"{_percent(share)} ({_percent(low)} to {_percent(high)})" for share, low, high in each]
 
 
 def _percent(share: float) -> str:

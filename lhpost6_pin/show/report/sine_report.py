@@ -1,6 +1,7 @@
 """The report of a sine test: amplitude, phase and distortion without and with the cancellers."""
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -171,6 +172,7 @@ def sine_table(test: SineTest) -> Table:
     return Table(caption, ("", "Controller alone", "With APC and AHC"), rows)
 
 
+@cache
 def _band() -> str:
     """The band in which harmonics are counted, in words."""
     return f"to {tuning_numbers().number('feedforward_targets.high'):g} Hz"

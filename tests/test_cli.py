@@ -316,7 +316,7 @@ def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_ins
         (("sine", "--set", "amplitude=large"), ("sine", "large")),
         (("sine", "--set", "amplitude=nan"), ("sine", "nan")),
         (("sine", "--axes", "q"), ("no axis 'q'",)),
-        (("sine", "--scale", "inf"), ("scale is inf",)),
+        (("sine", "--scale", "inf"), ("--scale inf",)),
         (("sine", "--axes", "x", "--set", "amplitude=0.01", "--amplify", "9"), ("--amplify", "add --live")),
         (("sine", "--scheme", "magic"), ("no scheme named 'magic'", "rk4")),
         (("sine", "--engine", "steam"), ("no engine named 'steam'", "fused")),

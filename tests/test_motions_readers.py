@@ -161,7 +161,7 @@ def test_numbers_alone_have_no_header_and_a_field_too_many_is_no_decimal_comma(t
         load_motion(written(tmp_path, "a.csv", text))
 
 
-@pytest.mark.parametrize("head", ["X Accel [g]", "x acceleration (g)", "x_acc_g", "East Acc g"])
+@pytest.mark.parametrize("head", ["X Accel [g]", "x acceleration (g)", "x_acc_g", "East Acc g", "Acc X (g)"])
 def test_the_word_of_a_quantity_before_its_unit_is_no_part_of_the_unit(tmp_path, head):
     motion = load_motion(written(tmp_path, "m.csv", f"time_s,{head}\n0,0\n0.01,0.5\n0.02,0\n"))
     assert motion.samples[1, 0] == pytest.approx(0.5 * 9.80665) and motion.quantity == "acceleration"

@@ -8,11 +8,13 @@ import typer
 
 from ..core.errors import MotionError, OutOfRangeError, SimulationError
 from ..core.names import AXES
+from ..core.units import numbers_in
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import completing
 from .loop_check import checked_loop, interaction_of, loop_entries, loop_facts
 from .motion_options import MotionOptions
+from .quantities import quantity_option
 from .rehearse import save_run
 from .results_folder import RUN_FILES
 
@@ -92,7 +94,9 @@ def replay(
     drive: Annotated[Path, typer.Argument(help="Drive file written by `lhpost6 iterate`.")],
     steps: opt.StepOptions,
     machine: opt.SpecimenOptions,
-    scale: Annotated[float, typer.Option(help="Factor of the drive and of its target motion.")] = 1.0,
+    scale: Annotated[
+        float, quantity_option("--scale", "1", "50%", "Factor of the drive and of its target motion.")
+    ] = 1.0,
     beyond: opt.Beyond = False,
     out: opt.Out = None,
     controller: opt.SettingsName = None,
@@ -188,8 +192,6 @@ def sine(
 
 def _amplitude(text: str, axis: str) -> float:
     """Amplitude on an axis [m, rad], as a user wrote it."""
-    from ..core.units import numbers_in
-
     unit = "m" if axis in AXES[:3] else "rad"
     numbers = numbers_in(text, unit)
     if numbers is None or len(numbers) > 1 or not numbers[0] > 0.0:

@@ -8,6 +8,7 @@ import typer
 
 from ..core.errors import ParameterError
 from ..core.names import ENGINES
+from ..core.units import numbers_in
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import complete_motion, completing
@@ -155,10 +156,10 @@ def ensemble(
 def _numbers(text: str | None) -> list[float] | None:
     if text is None:
         return None
-    try:
-        return [float(word) for word in text.split(",")]
-    except ValueError:
-        raise ParameterError(f"--scales {text}: write numbers with commas, such as 0.5,0.75,1") from None
+    numbers = numbers_in(text, "1")
+    if numbers is None:
+        raise ParameterError(f"--scales {text}: write numbers with commas, such as 0.5,0.75,1")
+    return numbers
 
 
 def _plan(words: list[str], processing: dict[str, Any], given: dict[str, Any]) -> "EnsemblePlan":

@@ -73,6 +73,7 @@ def watched(
         return
     with LiveView(table, title, look, ended=ended or (lambda: False)) as view:
         show_address(view.url, what, open_it, err)
+        typer.echo(f"the run begins when a browser shows that page, or in {PATIENCE:g} s", err=True)
         if not view.wait(PATIENCE):
             typer.echo(f"no viewer connected for {PATIENCE:g} s; continuing", err=True)
         yield view.show

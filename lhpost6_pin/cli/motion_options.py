@@ -10,6 +10,7 @@ from ..core.errors import MotionError
 from ..core.names import SAMPLE_RATE
 from .app import stderr
 from .completion import complete_motion
+from .quantities import quantity_option
 
 if TYPE_CHECKING:
     from ..machine.machine import Machine
@@ -32,9 +33,12 @@ LowPass = Annotated[float | None, typer.Option(help="Low-pass corner of the moti
 
 TimeScale = Annotated[
     float | None,
-    typer.Option(
-        help="Factor of durations; accelerations stay, displacements follow with its square (similitude). "
-        "A run needs about 6 GB of memory for 15 minutes of motion."
+    quantity_option(
+        "--time-scale",
+        "1",
+        "50%",
+        "Factor of durations; accelerations stay, displacements follow with its square (similitude). "
+        "A run needs about 6 GB of memory for 15 minutes of motion.",
     ),
 ]
 Taper = Annotated[
@@ -54,7 +58,7 @@ SpectrumDamping = Annotated[
 ]
 
 FileStep = Annotated[
-    float | None, typer.Option("--dt", help=r"Time step of a motion file that does not state it \[s].")
+    float | None, quantity_option("--dt", "s", "10ms", r"Time step of a motion file that does not state it \[s].")
 ]
 FileUnit = Annotated[
     str | None, typer.Option("--unit", help="Unit of a motion file that does not state it, such as g.")
@@ -83,7 +87,7 @@ class MotionOptions:
             autocompletion=complete_motion,
         ),
     ]
-    scale: Annotated[float, typer.Option(help="Scale factor of the motion.")] = 1.0
+    scale: Annotated[float, quantity_option("--scale", "1", "50%", "Scale factor of the motion.")] = 1.0
     axes: Annotated[
         str | None, typer.Option(help="Axes, such as xyz, x, or x=y (the table's x moved by component y).")
     ] = None

@@ -15,6 +15,7 @@ from .completion import complete_motion
 from .live_view import EndedBySignal, LiveOptions, watched
 from .loop_check import TUNING_FILES, checked_loop, interaction_of, loop_entries, loop_facts, retuned
 from .motion_options import MotionOptions
+from .quantities import quantity_option
 from .results_folder import RUN_FILES
 
 if TYPE_CHECKING:
@@ -173,7 +174,9 @@ def campaign(
     controller: opt.SettingsName = None,
     sensors: opt.SensorsName = None,
     tests: Annotated[str | None, typer.Option(help="Tests of the campaign, such as TX,WN; default: all.")] = None,
-    scale: Annotated[float, typer.Option(help="Scale factor of all motions, e.g. for a smaller table.")] = 1.0,
+    scale: Annotated[
+        float, quantity_option("--scale", "1", "50%", "Scale factor of all motions, e.g. for a smaller table.")
+    ] = 1.0,
     valves: opt.Valves = 0,
     beyond: opt.Beyond = False,
     errors: Annotated[bool, typer.Option(help="Draw random gains, offsets and skews of the sensors.")] = True,

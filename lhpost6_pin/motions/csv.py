@@ -22,9 +22,10 @@ _TIME = re.compile(r"(time|t)([\s_]*[\[(]?(?P<unit>s|sec|ms)[\])]?)?", re.I)
 _AXIS_NAMES = {"rx": "roll", "ry": "pitch", "rz": "yaw", **{axis: axis for axis in AXES}}
 _AXIS_NAMES |= dict.fromkeys(("ew", "e-w", "east"), "x") | dict.fromkeys(("ns", "n-s", "north"), "y")
 _AXIS_NAMES |= dict.fromkeys(("ud", "u-d", "up"), "z")
+_QUANTITY = r"acc(?:el(?:eration)?)?|disp(?:l(?:acement)?)?"  # of no account: the unit gives it
 _COLUMN = re.compile(
-    rf"(?:[ad]|acc)?_?(?P<axis>{'|'.join(sorted(_AXIS_NAMES, key=len, reverse=True))})"
-    r"(?:[\s_]+(?:acc(?:el(?:eration)?)?|disp(?:l(?:acement)?)?))?"  # the quantity, which the unit gives
+    rf"(?:(?:{_QUANTITY})[\s_]*|[ad]_?|_)?(?P<axis>{'|'.join(sorted(_AXIS_NAMES, key=len, reverse=True))})"
+    rf"(?:[\s_]+(?:{_QUANTITY}))?"
     r"(?:[\s_]*[\[(](?P<bracketed>[^\])]*)[\])]|[_ ](?P<suffix>.+))?",
     re.I,
 )

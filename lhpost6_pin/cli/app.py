@@ -123,6 +123,7 @@ def main() -> None:
     from rich.logging import RichHandler
 
     collect_less()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: more threads double processor time, not speed
     handler = RichHandler(console=stderr(), show_path=False, show_time=False)
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])
     with _noting_ctrl_c():

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ..core.errors import MotionError, OutOfRangeError, SimulationError
+from ..core.errors import MotionError, SimulationError
 from ..core.names import AXES
 from ..core.units import numbers_in
 from . import options as opt
@@ -177,12 +177,8 @@ def sine(
     settings = opt.find_settings(controller, table)
     folder = opt.folder_for(out, f"sine_{axis}_{size:g}_{frequency:g}Hz", "report.html")
     if not beyond:
-        try:
-            check_motion_limits(plant, sine_target(axis, size, frequency)[0])
-        except OutOfRangeError as error:
-            fits = rounded_down(size * (error.largest_scale or 0.0), 3)
-            hint = f". The largest --amplitude that fits is {fits:g}" if fits else ""
-            raise OutOfRangeError(f"{error}{hint}", error.largest_scale, error.exceeded) from None
+        target = sine_target(axis, size, frequency)[0]
+        check_motion_limits(plant, target, size=lambda s: f"--amplitude that fits is {rounded_down(size * s, 3):g}")
     loop = loop_facts(checked_loop(table, settings, machine), machine)
     with progress_bar(f"sine in {axis} on {table.name}") as progress:
         found = sine_test(table, settings, axis=axis, amplitude=size, frequency=frequency, progress=progress)

@@ -53,9 +53,9 @@ def _whole_periods(samples: int, rate: float, fundamental: float) -> int:
 
 
 def total_harmonic_distortion(h: Harmonics) -> float:
-    """Amplitude of all harmonics together over that of the fundamental [1]; NaN if there is no fundamental."""
+    """Amplitude of all harmonics together over that of the fundamental [1]; NaN without one, or without harmonics."""
     first, *rest = h.amplitude
-    return float(np.linalg.norm(rest) / first) if first > 0 else float("nan")
+    return float(np.linalg.norm(rest) / first) if first > 0 and rest else float("nan")
 
 
 def total_distortion(signal: ArrayLike, rate: float, fundamental: float) -> float:

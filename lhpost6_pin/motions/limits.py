@@ -106,21 +106,28 @@ class LimitsSummary:
 
 
 def check_limits(
-    target: Target, limits: MotionLimits, check: MotionCheck | None = None, units: Units = SI
+    target: Target,
+    limits: MotionLimits,
+    check: MotionCheck | None = None,
+    units: Units = SI,
+    size: Callable[[float], str] | None = None,
 ) -> LimitsSummary:
     """Utilisation of the table by a target.
 
     `check` adds demands on actuators and parts; texts are in `units`. Raises OutOfRangeError with the largest scale
     within the limits, then a clause per exceeded quantity, axes before actuators: the governing one with its value,
-    limit, time and sample, and the names of the others.
+    limit, time and sample, and the names of the others. Of a target that has no scale for its user, `size` says in
+    words what such a scale makes of it, as "amplitude is 36 mm".
     """
     peaks = limit_peaks(target, limits, check, units)
     over = [peak for peak in peaks if peak.decides and peak.utilisation > _FULL]
     if over:
         fits = largest_scale(target, limits, check)
+        name = target.reference.title if size is None else target.reference.motion
+        largest = f"scale that fits is {fits:g}" if size is None else size(fits)
         raise OutOfRangeError(
-            f"{target.reference.title} exceeds the capacity of the table. "
-            f"The largest scale that fits is {fits:g}; exceeded: {'; '.join(_clauses(over, target.time))}",
+            f"{name} exceeds the capacity of the table. The largest {largest}; exceeded: "
+            f"{'; '.join(_clauses(over, target.time))}",
             fits,
             tuple(dict.fromkeys(peak.quantity for peak in over)),
         )

@@ -20,6 +20,7 @@ import numpy as np
 from ..core.errors import MotionError
 from ..core.files import models_folder
 from .joins import join_warning, sharp_joins
+from .lost_peaks import lost_peaks
 from .motion import AXES, GroundMotion
 from .target_spectrum import TargetSpectrum
 from .toml import load_toml, values_of
@@ -99,6 +100,13 @@ def axes_map(text: str) -> tuple[tuple[str, str], ...]:
             raise MotionError(
                 f"axes {text!r}: no axis {name!r}; write such as xyz, x, x=y or x,roll of {', '.join(AXES)}"
             )
+    for axis, channel in pairs:
+        if (axis in AXES[:3]) != (channel in AXES[:3]):
+            kinds = ("a translation", "a rotation") if axis in AXES[:3] else ("a rotation", "a translation")
+            raise MotionError(
+                f"axes {text!r}: {axis} is {kinds[0]} and {channel} {kinds[1]}, metres are no radians; choose a component "
+                "of the same kind"
+            )
     if not pairs or len({axis for axis, _ in pairs}) < len(pairs):
         raise MotionError(f"axes {text!r}: name each axis of the table once")
     return tuple(pairs)
@@ -127,7 +135,8 @@ def make_target(
     is the controller's [1/s].
 
     A displacement motion that does not begin and end at rest has a pulse of acceleration there; unless `warn` is False,
-    a warning is logged of one that exceeds the motion's own (`joins`).
+    a warning is logged of one that exceeds the motion's own (`joins`), and of peaks that the low-pass takes
+    (`lost_peaks`).
 
     Raises MotionError for a window, corner or scale that makes no sense, or numbers too large to compute with.
     """
@@ -174,7 +183,13 @@ def make_target(
     else:
         extended = _extend_displacement(channels, ends, total)
     frequency = np.fft.rfftfreq(total, motion.time_step)[:, None]
-    series = np.fft.rfft(extended, axis=0) * _gain(frequency, high_pass, low_pass, settings)
+    series = np.fft.rfft(extended, axis=0)
+    if warn:
+        kept = np.fft.irfft(series * _gain(frequency, 0.0, low_pass, settings), total, axis=0)
+        allowed, unit = (settings["lost_acceleration"], "m/s^2") if integrated else (settings["lost_displacement"], "m")
+        if lost := lost_peaks(motion.name, extended, kept, low_pass, allowed, unit):
+            _log.warning("%s", lost)
+    series = series * _gain(frequency, high_pass, low_pass, settings)
     if total % 2 == 0:
         series[-1] = 0  # the highest frequency has no derivative in a real series
     if integrated:

@@ -7,6 +7,7 @@ The comparison and the largest scale that fits are in `motions.limits`.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -34,8 +35,15 @@ FLOW = "actuator velocity"
 """Name of the limit that the flow of valves sets."""
 
 
-def check_motion_limits(plant: Plant, target: Target, units: Units = SI, *, remedies: bool = True) -> LimitsSummary:
-    """Demand of a target over the capacity of a plant, by limit, with texts in `units`.
+def check_motion_limits(
+    plant: Plant,
+    target: Target,
+    units: Units = SI,
+    *,
+    remedies: bool = True,
+    size: Callable[[float], str] | None = None,
+) -> LimitsSummary:
+    """Demand of a target over the capacity of a plant, by limit, with texts in `units`; `size` as in `check_limits`.
 
     Raises OutOfRangeError that names each limit exceeded and the largest scale that fits; where the flow of valves is
     exceeded, with `remedies` also the scale with all servovalves open and that by the other reading of Eq. 4-2. For a
@@ -44,7 +52,7 @@ def check_motion_limits(plant: Plant, target: Target, units: Units = SI, *, reme
     refuse_blocked_axes(plant, target)
     bounds = _axis_limits(plant)
     try:
-        return check_limits(target, bounds, make_motion_check(plant), units)
+        return check_limits(target, bounds, make_motion_check(plant), units, size)
     except OutOfRangeError as error:
         if not remedies or FLOW not in error.exceeded:
             raise
@@ -52,7 +60,7 @@ def check_motion_limits(plant: Plant, target: Target, units: Units = SI, *, reme
         for remedy in flow_remedies(plant.machine):
             fits = fitting_scale(make_plant(remedy.machine), target)
             if least is None or fits > least:  # else other limits govern
-                words.append(f"{remedy.words} the largest scale is {fits:g}")
+                words.append(f"{remedy.words} the largest {size(fits) if size else f'scale is {fits:g}'}")
         raise OutOfRangeError(". ".join(words), least, error.exceeded) from None
 
 

@@ -29,6 +29,7 @@ from ..machine.machine import Machine
 from ..mechanics.plant import Plant
 from ..mechanics.pose import platen_motion
 from ..motions import Target, find_motion, make_target, motion_options, smooth_step
+from ..motions.process import processing
 from ..simulation.motion_limits import fitting_scale
 from ..simulation.simulate import ClosedLoop, Run, fastest_engine, simulate
 from ..simulation.trouble import with_pressure_trouble
@@ -44,6 +45,10 @@ __all__ = [
     "sine_test",
     "with_cancellers",
 ]
+
+
+_CLEAR = 8.0
+"""Least low-pass of the target over the frequency of its sine, whose amplitude it leaves as it is."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +150,7 @@ def sine_target(axis: str, amplitude: float, frequency: float) -> tuple[Target, 
     ramp = next(int(o.default) for o in motion_options("sine") if o.name == "ramp_cycles")
     whole = int(np.ceil(numbers.settling * numbers.time_constant * frequency)) + cycles
     motion = find_motion("sine", axis=axis, amplitude=amplitude, period=1.0 / frequency, cycles=whole, ramp_cycles=ramp)
-    target = make_target(motion, axes=axis)
+    target = make_target(motion, axes=axis, low_pass=max(processing()["low_pass"], _CLEAR * frequency))
     periods = (target.time + target.reference.start) * frequency  # since the start of the sine
     level = smooth_step(periods / ramp)[0] * smooth_step((whole + 2 * ramp - periods) / ramp)[0]
     first = int(np.searchsorted(periods, ramp + whole - cycles))
@@ -193,13 +198,24 @@ def sine_test(
             simulate(plant, ClosedLoop(controller, drive, rest), samples=len(wanted), **options)
         )
         if run.trouble:
-            without = ". Without them the same sine runs to its end: the cancellers are unstable here" if n else ""
-            raise SimulationError(f"{'with' if n else 'without'} cancellers the run {run.trouble}{without}")
+            why = ". Without them the same sine runs to its end: the cancellers are unstable here" if n else ""
+            why = why or _overshoot(run, target, AXES.index(axis))
+            raise SimulationError(f"{'with' if n else 'without'} cancellers the run {run.trouble}{why}")
         found.append(_evaluate(run, target, AXES.index(axis), frequency, measured, counted))
         if progress is not None:
             progress((n + 1) / 2)
     cancelled, (before, after) = len(adaptive.canceller), found
     return SineTest(settings, target, axis, amplitude, frequency, measured, before, after, cancelled, count)
+
+
+def _overshoot(run: Run, target: Target, k: int) -> str:
+    """A sentence on an acceleration beyond that of the target, which alone was held against the limits."""
+    count = len(run.time)
+    achieved = np.abs(platen_motion(run.plant, run.q, run.v, run.a).acceleration[:, k]).max()
+    factor = float(achieved / np.abs(target.acceleration[:count, k]).max())
+    if not 1.0 < factor < np.inf:
+        return ""
+    return f". The acceleration reaches {factor:.3g} times that of the target: choose an amplitude smaller by as much"
 
 
 def _evaluate(run: Run, target: Target, k: int, frequency: float, measured: slice, count: int) -> SineResult:

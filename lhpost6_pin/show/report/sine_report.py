@@ -28,7 +28,7 @@ __all__ = ["sine_table", "sine_verdict", "write_sine_report"]
 # Judgement, not physics: what a sine test must reach.
 AMPLITUDE = 0.01
 PHASE = np.radians(2.0)
-GROWN = 1.05  # RMS error of the last measured cycle over the first from which it counts as growing
+GROWN = 1.05  # RMS error of the last measured cycle over the first from which it counts as growing, if not small
 DISTORTION_LEFT = 0.5  # share of the total harmonic distortion without cancellers
 DISTORTION_RISEN = 2.0  # the same, from which a test with cancellers is bad
 SHAKEN = 2.0  # peak acceleration achieved over that of the target, from which the verdict states both
@@ -74,7 +74,7 @@ def write_sine_report(
 def _reached(test: SineTest) -> tuple[bool, bool, bool]:
     """True for amplitude, phase and distortion with cancellers that are within their criteria."""
     after, before = test.after, test.before
-    halved = after.distortion <= DISTORTION_LEFT * before.distortion
+    halved = after.distortion <= DISTORTION_LEFT * before.distortion or not _has_harmonics(test)
     return abs(after.amplitude_error) <= AMPLITUDE, bool(abs(after.phase_error) <= PHASE), halved
 
 
@@ -105,7 +105,7 @@ def sine_verdict(test: SineTest, loop: Mapping[str, Any]) -> tuple[str, Level]:
         words.append(f"The acceleration reaches {shown_as(peak, scale)} for a target of {shown_as(wanted, scale)}.")
         level = "bad"
     _, rms = error_per_cycle(motion_error(test, after)[test.measured], test.frequency)
-    if len(rms) > 1 and rms[-1] > GROWN * rms[0]:
+    if len(rms) > 1 and rms[-1] > max(GROWN * rms[0], AMPLITUDE * wanted / np.sqrt(2.0)):
         cause = "" if unstable else ": the cancellers are unstable here"
         words.append(f"The error with the cancellers grows from cycle to cycle{cause}.")
         level = "bad"
@@ -124,6 +124,8 @@ def _change_of_distortion(test: SineTest) -> tuple[str, bool]:
     everywhere = (
         f"at all frequencies it is {percent(test.before.distortion_all)} and {percent(test.after.distortion_all)}"
     )
+    if not _has_harmonics(test):
+        return f"No harmonic lies in the band {_band()}, where distortion is judged; {everywhere}.", False
     if not np.isfinite([before, after]).all():
         return f"{what} is not judged: {percent(before)} without, {percent(after)} with them.", False
     if after < before:
@@ -146,9 +148,11 @@ def _headlines(test: SineTest) -> list[Headline]:
             f"; at all frequencies {percent(test.after.distortion_all)}",
         ),
     )
+    levels: list[Level | None] = ["good" if met else "attention" for met in _reached(test)]
+    levels[2] = levels[2] if _has_harmonics(test) else None
     return [
-        Headline(shown(test.after), label, f"without {shown(test.before)}{note}", "good" if met else "attention")
-        for (label, shown, note), met in zip(tiles, _reached(test), strict=True)
+        Headline(shown(test.after), label, f"without {shown(test.before)}{note}", level)
+        for (label, shown, note), level in zip(tiles, levels, strict=True)
     ]
 
 
@@ -170,6 +174,11 @@ def sine_table(test: SineTest) -> Table:
     rows = [(name, shown(test.before), shown(test.after)) for name, shown in quantities.items()]
     caption = "Amplitude and phase of the fundamental, THD = √(Σ harmonics²) ∕ fundamental"
     return Table(caption, ("", "Controller alone", "With APC and AHC"), rows)
+
+
+def _has_harmonics(test: SineTest) -> bool:
+    """Whether a multiple of the frequency is within the band in which they are counted."""
+    return len(test.after.acceleration.frequency) > 1
 
 
 @cache

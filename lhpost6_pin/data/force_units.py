@@ -3,7 +3,8 @@
 Hypotheses are compared by what they leave of the balance of forces (`force_balance`): the forces as they are, and those
 of a set of actuators times a factor, that of two units exchanged or -1. A hypothesis holds where it explains what is
 required but for a stated share, and where with the forces as they are, and without those it corrects, the remainder is
-a stated multiple: friction that is not modelled may be removed with the forces, but not explained by their factor.
+a stated multiple: friction that is not modelled may be removed with the forces, but not explained by their factor, and
+no unit is named by inertia where the corrected forces would hold more than a stated share of friction.
 Of hypotheses that do as well, that of a whole kind of actuators is taken.
 
 Forces that motion confirms as they are, those without which a balance that holds would be much worse, are not doubted.
@@ -141,6 +142,7 @@ class _Search:
         at_rest = balance.by == "weight"
         share, margin = (self.numbers.number(f"{'rest_' * at_rest}balance.{key}") for key in ("share", "margin"))
         as_it_is, without = balance.remainder(self.factor), balance.remainder(np.where(sets, 0.0, self.factor))
+        rubbed = self.numbers.number("force_unit.friction")
         opposes = np.sum(balance.gram[:, -1, :-1], axis=0) * self.factor < 0.0  # what is required
         least, rows = float(as_it_is), []
         for factor in self._factors():
@@ -150,6 +152,8 @@ class _Search:
             holds = (left <= share * balance.required) & (margin * left <= np.minimum(as_it_is, without))
             if factor == TURNED:
                 holds &= np.all(~sets | opposes, axis=1)
+            elif not at_rest:  # where friction is not small beside inertia, it alone may set the size
+                holds &= balance.friction(changed) <= rubbed * balance.required
             if at_rest:
                 holds &= self._plausible(sets, changed, factor) | whole_kind
             for k in np.flatnonzero(holds):

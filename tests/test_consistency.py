@@ -290,3 +290,16 @@ def test_play_is_one_effect_where_all_pins_have_about_as_much():
     assert grouped(H1=5e-5, H2=6e-5, H3=7e-5, H4=2e-4) == [[name] for name in names]
     assert grouped(H2=5e-5, H3=5e-5) == [["H2"], ["H3"]]
     assert grouped() == []
+
+
+@pytest.mark.parametrize("late", [0.0, 4e-3, 1e-2])
+def test_a_late_accelerometer_is_found_where_noise_of_the_displacement_hides_its_gain(plant, redundant, late):
+    """Motion of a fiftieth: noise is more than a tenth of the derivatives, shrinks the gain, and the delay no less."""
+    channels = ["platen_displacement", "platen_acceleration"]
+    small = [r[channels].map(lambda x: 0.02 * x, keep_attrs=True) for r in redundant]
+    small = with_change(small, channels[1], lambda x: align(x, -late, 1 / RATE))
+    noisy = [add_noise(r, SENSORS, np.random.default_rng(k)) for k, r in enumerate(small)]
+    found = check_sensors(plant, noisy, SENSORS)
+    gain, delay = (find(found, "platen_acceleration[x]", quantity) for quantity in ("gain", "delay"))
+    assert gain.verdict == "untested" and delay.verdict == ("suspicious" if late else "untested")
+    assert delay.estimate == pytest.approx(late, abs=5e-4)  # three standard errors

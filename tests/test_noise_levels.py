@@ -456,3 +456,16 @@ def test_records_of_any_sampling_rate_and_length_are_judged_without_a_crash(expo
     check_campaign(TABLE, [record], "lhpost6")
     fused = fuse_motion(PLANT, record, load_sensors())
     assert np.isfinite(fused.motion.displacement).all()
+
+
+@pytest.mark.parametrize("factors", [(0.1, 1.0), (1.0, 5.0), (0.1, 4.0)])
+def test_noise_of_translations_says_nothing_of_that_of_rotations(factors):
+    """Both had the ratio of their mean, of metres and radians: that of translations."""
+    stated, table = load_sensors("lhpost6"), load_machine()
+    still = load_record(PRACTICE)
+    still = still[["platen_displacement"]].map(np.zeros_like, keep_attrs=True).assign_attrs(kind="measured")
+    noisy = add_noise(still, stated, np.random.default_rng(3))
+    noisy["platen_displacement"].values[:] *= np.repeat(factors, 3)
+    found = find_sensors(table, [noisy], "lhpost6").noise["platen_displacement"]
+    # a level is a median over some hundred bins of a short rest: within a few per cent, mean of three
+    np.testing.assert_allclose(found / stated.noise["platen_displacement"], np.repeat(factors, 3), rtol=0.1)

@@ -39,6 +39,7 @@ FOLLOWING = ("platen_velocity", "platen_acceleration", "actuator_displacement") 
 LATE = 0.125  # rad at the end of the band, 1 ms: a delay below it is a coefficient of the derivative
 LEVELS = ("offset", "drift")  # quantities identifiable in spite of noise
 CONFIDENCE = 3.0  # standard deviations
+LEAST_GAIN = 0.5  # of a regressor with such noise, from which on its delay, which noise shrinks as well, is a bound
 MOST_NOISE = 0.1  # share of noise in a column, less the others, above which its correction is not accurate
 
 
@@ -48,7 +49,8 @@ class ConsistencyFinding:
 
     `tolerance` covers errors of calibration and geometry, at least three deviations except for delays; `standard_error`
     is that of the noise. A gain or delay is "untested" where noise is too large: a standard error beyond the tolerance,
-    or more than a tenth of the regressor's power. `instead` are untested quantities that would have the same effect:
+    or more than a tenth of the regressor's power; but for a delay that is beyond its tolerance in spite of the latter,
+    which shrinks it. `instead` are untested quantities that would have the same effect:
     where nothing varies, an offset may be a gain.
     """
 
@@ -201,7 +203,10 @@ def _findings(check: str, channel: str, s: _Sums, noise_range: float, late: floa
             range_ = by.bound[i] + by.doubt[i]  # delays have limits, not deviations
         value, sigma, due, range_ = float(value), float(sigma), float(term.expected), float(range_)
         others = () if held[i] else tuple(s.terms[k].quantity for k in np.flatnonzero(held & (moved[i] > sigma)))
-        verdict: Verdict = "untested" if held[i] else _verdict(abs(value - due), sigma, range_)
+        # noise of a regressor only shrinks its coefficient: a delay that is clear is no less, if its gain is large
+        bounded = term.delay is not None and free.theta[0] > LEAST_GAIN and free.error[i] < free.lawful[i]
+        verdict = _verdict(abs(value - due), sigma, range_)
+        verdict = "untested" if held[i] and not (bounded and verdict == "suspicious") else verdict
         unit = term.unit or unit_y
         yield ConsistencyFinding(check, channel, term.quantity, unit, value, sigma, due, range_, verdict, others)
     # an untested coefficient may explain most; a channel of zeros has no noise

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from ..core.arrays import Array
+from ..core.arrays import Array, Mask
 from ..core.errors import RecordError
 from ..core.files import write_whole
 from ..core.names import AXES
@@ -106,8 +106,8 @@ def find_sensors(
 def with_measured_noise(sensors: SensorSet, records: Sequence[xr.Dataset]) -> SensorSet:
     """The same sensors with the noise of measured records where theirs differs from it by more than a quarter.
 
-    Of six axes it is the mean, in proportion. Channels whose noise these records hide, or that rest between two steps
-    of the converter, and those that the file states free of noise, stay as stated.
+    Of six axes it is the mean of translations and of rotations, in proportion. Channels whose noise these records hide,
+    or that rest between two steps of the converter, and those that the file states free of noise, stay as stated.
     """
     if not records:
         return sensors
@@ -115,21 +115,34 @@ def with_measured_noise(sensors: SensorSet, records: Sequence[xr.Dataset]) -> Se
     most, levels = numbers.number("assumed.agrees"), noise_levels(records, numbers)
     found, quantities = dict[str, float](), dict(sensors.parameters.quantities)
     for name, one in levels.channels.items():
-        varies = one.density > 0
-        if one.density[varies].mean() < SHAKEN * one.quantum[varies].mean() or _filtered(one, levels.rate, sensors):
+        due = _stated_density(one, levels.rate, sensors)
+        if not due.any() or _filtered(one, levels.rate, sensors):
             continue
-        stated = float(_stated_density(one, levels.rate, sensors)[varies].mean())
-        ratio = np.sqrt(one.density[varies].mean() / stated) if stated else 1.0
-        if not 1 / most <= ratio <= most:
-            found[name] = float(ratio)
-            old = quantities[f"noise.{name}"]
-            sd = (np.atleast_1d(old.value) * ratio).tolist()
-            quantities[f"noise.{name}"] = _measured(sd if len(sd) > 1 else sd[0], old.unit, levels.source)
+        old = quantities[f"noise.{name}"]
+        sd = np.broadcast_to(np.asarray(old.value, float), one.density.shape).copy()
+        for kind, part in _parts(one):
+            varies = part & (one.density > 0)
+            if one.density[varies].sum() < SHAKEN * one.quantum[varies].sum() or not due[varies].any():
+                continue
+            ratio = float(np.sqrt(one.density[varies].mean() / due[varies].mean()))
+            if not 1 / most <= ratio <= most:
+                found[name + kind] = ratio
+                sd[part] *= ratio
+                value = sd.tolist() if kind else float(sd[0])
+                quantities[f"noise.{name}"] = _measured(value, old.unit, levels.source)
     if not found:
         return sensors
     said = ", ".join(f"{name} {ratio:.2g}" for name, ratio in found.items())
     log.warning("sensors: %s: noise replaced by %s (times stated: %s)", sensors.name, levels.source, said)
     return make_sensors(replace(sensors.parameters, quantities=quantities), sensors.name)
+
+
+def _parts(one: ChannelNoise) -> list[tuple[str, Mask]]:
+    """Columns (k,) whose noise is of one kind: translations and rotations of six axes, else all; in words."""
+    if "axis" not in LAYOUT[one.channel].dims:
+        return [("", np.ones(len(one.density), bool))]
+    translation = np.arange(len(AXES)) < 3
+    return [(" of translations", translation), (" of rotations", ~translation)]
 
 
 def measured_sensors(

@@ -104,8 +104,8 @@ def axes_map(text: str) -> tuple[tuple[str, str], ...]:
         if (axis in AXES[:3]) != (channel in AXES[:3]):
             kinds = ("a translation", "a rotation") if axis in AXES[:3] else ("a rotation", "a translation")
             raise MotionError(
-                f"axes {text!r}: {axis} is {kinds[0]} and {channel} {kinds[1]}, metres are no radians; choose a component "
-                "of the same kind"
+                f"axes {text!r}: {axis} is {kinds[0]} and {channel} {kinds[1]}, metres are no radians; choose a "
+                "component of the same kind"
             )
     if not pairs or len({axis for axis, _ in pairs}) < len(pairs):
         raise MotionError(f"axes {text!r}: name each axis of the table once")

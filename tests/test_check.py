@@ -213,6 +213,9 @@ def test_a_record_sampled_too_slowly_is_found(tests):
         ("WN", "platen_velocity[z]", 1 / 0.0254, "in inches"),
         ("WN", "platen_velocity[yaw]", 180 / np.pi, "in degrees"),
         ("WN", "platen_velocity[y]", -1.0, "opposite signs"),
+        ("WN", "platen_velocity[x]", 25.4, "or platen_displacement[x] in inches, taken for mm?"),
+        ("WN", "platen_velocity[x]", 1 / 25.4, "or platen_displacement[x] in mm, taken for inches?"),
+        ("WN", "platen_acceleration[x]", 9.80665, "in m/s2, taken for g?"),
     ],
 )
 def test_values_of_another_unit_or_sign_are_found_with_the_likely_reason(tests, test, name, factor, said):

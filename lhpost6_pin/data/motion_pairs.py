@@ -16,19 +16,22 @@ _Warning = tuple[str, int | None, str, str]  # channel, sample, message, remedy
 
 GAIN_TOLERANCE = 0.1  # between a channel and the derivative of another; calibration errors are far smaller
 LIKE_AXES = tuple((j, k) for k in range(6) for j in range(6) if j // 3 == k // 3)  # of one unit
-USUAL_FACTORS = {  # gain of a channel over what it should be -> likely reason
+USUAL_FACTORS = {  # gain of a channel over what it should be -> likely reason; {} is the other channel
     -1.0: "opposite signs",
     1 / 9.80665: "in g",
+    9.80665: "in m/s2, taken for g",
     1e3: "in mm",
+    1e2: "in cm",
     1 / 0.0254: "in inches",
     180 / np.pi: "in degrees",
-    1e-3: "the other in mm",
-    0.0254: "the other in inches",
-    np.pi / 180: "the other in degrees",
-    1 / 25.4: "the other in mm, taken for inches",
-    25.4: "in mm, taken for inches",
-    10.0: "in mm, taken for cm",
-    0.1: "the other in mm, taken for cm",
+    1e-3: "{} in mm",
+    1e-2: "{} in cm",
+    0.0254: "{} in inches",
+    np.pi / 180: "{} in degrees",
+    25.4: "in mm, taken for inches, or {} in inches, taken for mm",
+    1 / 25.4: "in inches, taken for mm, or {} in mm, taken for inches",
+    10.0: "in mm, taken for cm, or {} in cm, taken for mm",
+    0.1: "in cm, taken for mm, or {} in mm, taken for cm",
 }
 
 
@@ -40,13 +43,11 @@ def inconsistent_motion(dataset: xr.Dataset) -> Iterator[_Warning]:
             right = gain is not None and abs(gain - 1) <= GAIN_TOLERANCE
             place, source = channel_name(dataset[MOTION[high]], k), channel_name(dataset[MOTION[low]], j)
             if j == k and gain is not None and not right:
-                reason = next((f" ({why}?)" for g, why in USUAL_FACTORS.items() if abs(gain / g - 1) < 0.1), "")
-                yield (
-                    place,
-                    None,
-                    f"is {gain:.3g} times that derived from {source}{reason}",
-                    "check units and signs of both",
-                )
+                usual = min(USUAL_FACTORS, key=lambda factor: abs(gain / factor - 1))
+                near = abs(gain / usual - 1) < GAIN_TOLERANCE
+                reason = f": {USUAL_FACTORS[usual].format(source)}?" if near else ""
+                message = f"is {gain:.3g} times that derived from {source}{reason}"
+                yield place, None, message, "check units and signs of both"
             elif j != k and right and gains[k, k] is None:
                 yield place, None, f"is the derivative of {source}", "the two channels may be swapped"
 

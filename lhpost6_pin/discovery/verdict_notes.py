@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..identification.validation import PHASES
 from ..machine.library import find_family
 from .balances import Balance
 from .estimates import deviations
@@ -90,12 +91,23 @@ def refit_summary(found: "Discovery") -> str:
         return ""
     gap = max(gaps, key=lambda one: one.delivered / one.refitted)
     sizes = f"{gap.delivered:.3g} to {gap.refitted:.3g} times sensor noise"
-    errors = _sensor_errors(found.search)
+    errors = [name for name in _sensor_errors(found.search) if _reaches(name, gap.phase, found.search.problem.names)]
     within = "" if found.verdict.sensors else " within their ranges"
     by = [f"errors of sensors{within} (foremost {', '.join(errors[:LISTED])})"] if errors else []
     by += ["the parameters that differ"] if found.verdict.changed else []
     causes = " and ".join(by) or "small changes of many parameters"
     return f" A refit lowers the held-out error ({gap.phase}, {gap.test}: {sizes}) by {causes}."
+
+
+def _reaches(error: str, phase: str, names: Sequence[str]) -> bool:
+    """Whether an error of a sensor, as in `gain spool_position[H1]`, is in what a phase reads.
+
+    Inverse dynamics reads motion, gas and forces; chamber pressures only where no force was recorded.
+    """
+    channel = error.split()[-1].partition("[")[0]
+    if phase != PHASES[1] or channel.startswith(("platen", "point", "actuator", "strut")):
+        return True
+    return channel.startswith(("chamber", "pressure")) and not any("actuator_force" in name for name in names)
 
 
 def _sensor_errors(found: Search) -> list[str]:

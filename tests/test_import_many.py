@@ -78,6 +78,22 @@ def test_where_nothing_can_be_imported_it_is_an_error(lhpost6, tmp_path, campaig
     assert not list((tmp_path / "out").rglob("*.nc"))
 
 
+def test_notes_in_a_folder_are_passed_over_and_damaged_tables_are_not(tmp_path):
+    texts = {
+        "README.txt": "Notes of the day\n\nTest 3: oil at 38 degrees, repeated at 14:30\n",
+        "log.csv": "date,who,what\nMonday,JC,second run of TX after a trip\n",
+        "table.csv": "t,x\n0.0,1.0\n0.01,1.1\n",
+        "damaged.csv": "t,x,y,z\n0.0,1.0,abc,2.0\n0.01,1.1,abc,2.0\n",
+        "commas.csv": 't,x\n"0,0","1,0"\n"0,01","1,1"\n',
+        "empty.txt": "",
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    found = {test.file.name for test in find_tests([tmp_path])}
+    assert found == {"table.csv", "damaged.csv", "commas.csv", "empty.txt"}
+    assert [test.file.name for test in find_tests([tmp_path / "README.txt"])] == ["README.txt"]  # named, it is data
+
+
 def test_names_of_tests_tell_them_apart(tmp_path, campaign):
     other = tmp_path / "t2"
     other.mkdir()

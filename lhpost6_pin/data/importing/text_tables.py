@@ -26,10 +26,11 @@ from .channel_units import si_factor, time_unit, unit_in_name
 from .clock_stamps import is_stamp, take_stamps
 from .raw import RawTest, make_raw, shown
 
-__all__ = ["read_parquet", "read_table"]
+__all__ = ["is_note", "read_parquet", "read_table"]
 
 _FACT = re.compile(r"[#%]\s*(?P<key>\w[\w .]{0,60}?)\s*[:=]\s*(?P<value>.*)")
 _SEPARATORS = (",", ";", "\t", "|", " ")
+_DIALECTS = (*(Dialect(s, ".") for s in _SEPARATORS), *(Dialect(s, ",") for s in _SEPARATORS[1:]))
 _COMMAS = "write decimals with points, as 0.01, or all of them with commas and semicolons between columns"
 _SAMPLE = 200  # lines from which separator and header are found
 
@@ -63,6 +64,13 @@ def read_table(content: bytes, source: str) -> RawTest:
     return _raw_of_columns(source, "table in text", names, units, values, facts, stamped)
 
 
+def is_note(content: bytes) -> bool:
+    """Whether a text of some words holds no row of numbers, nor one with an odd field: it is no damaged table."""
+    lines = _decoded(content).splitlines()[:_SAMPLE]
+    table = any(_number_rows(lines, dialect) for dialect in _DIALECTS) or _why_no_row(lines)
+    return any(line.strip() for line in lines) and not table
+
+
 def _decoded(content: bytes) -> str:
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return content.decode("utf-16", errors="replace")
@@ -79,12 +87,8 @@ def _is_comment(line: str) -> bool:
 def _sniff(lines: Sequence[str], source: str) -> _Layout:
     """Separator and decimal mark by which most lines are equally long rows of numbers."""
     best: tuple[int, _Layout] | None = None
-    for dialect in (*(Dialect(s, ".") for s in _SEPARATORS), *(Dialect(s, ",") for s in _SEPARATORS[1:])):
-        rows: list[tuple[int, int]] = []
-        for number, line in enumerate(lines[:_SAMPLE]):
-            fields = [] if _is_comment(line) else dialect.split(line)
-            if any(c.isdigit() for field in fields for c in field) and all(_fits(field, dialect) for field in fields):
-                rows.append((number, len(fields)))
+    for dialect in _DIALECTS:
+        rows = _number_rows(lines[:_SAMPLE], dialect)
         if not rows:
             continue
         counts = [count for _, count in rows]
@@ -94,15 +98,30 @@ def _sniff(lines: Sequence[str], source: str) -> _Layout:
         if best is None or score > best[0]:
             best = score, _Layout(dialect, first, count)
     if best is None:
-        quoted = any(has_decimal_comma(field) for line in lines[:_SAMPLE] for field in Dialect(",").split(line))
-        remedy = _COMMAS if quoted else _odd_field(lines) or "give a header row of names, then one row per sample"
+        remedy = _why_no_row(lines[:_SAMPLE]) or "give a header row of names, then one row per sample"
         raise RecordError(f"{source}: no row of numbers found; {remedy}")
     return best[1]
 
 
+def _number_rows(lines: Sequence[str], dialect: Dialect) -> list[tuple[int, int]]:
+    """Lines, from 0, that are rows of numbers, and the fields in each."""
+    rows = []
+    for number, line in enumerate(lines):
+        fields = [] if _is_comment(line) else dialect.split(line)
+        if any(c.isdigit() for field in fields for c in field) and all(_fits(field, dialect) for field in fields):
+            rows.append((number, len(fields)))
+    return rows
+
+
+def _why_no_row(lines: Sequence[str]) -> str:
+    """What keeps lines that nearly are rows of numbers from being any; empty if none nearly is."""
+    quoted = any(has_decimal_comma(field) for line in lines for field in Dialect(",").split(line))
+    return _COMMAS if quoted else _odd_field(lines)
+
+
 def _odd_field(lines: Sequence[str]) -> str:
     """The first field that is no number in the first line of which most are; empty if there is none."""
-    for number, line in enumerate(lines[:_SAMPLE], start=1):
+    for number, line in enumerate(lines, start=1):
         for dialect in () if _is_comment(line) else (Dialect(s) for s in _SEPARATORS):
             fields = dialect.split(line)
             odd = [k for k, field in enumerate(fields) if not _fits(field, dialect)]

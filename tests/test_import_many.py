@@ -125,6 +125,7 @@ def test_an_import_warns_of_redundant_sensors_that_contradict_each_other_as_a_ch
     save_record(record, tmp_path / "TX.nc")
     assert lhpost6("export", tmp_path / "TX.nc", "--to", "csv", "--out", folder / "TX.csv").code == 0
     imported = lhpost6("import", folder / "TX.csv", "--out", tmp_path / "again.nc")
+    assert refused(lhpost6("import", folder / "TX.csv", "--out", tmp_path / "again.csv"), "name it again.nc")
     checked = lhpost6("check", tmp_path / "again.nc")
     (words,) = (line for line in checked.out.splitlines() if line.startswith("warning: actuator_displacement[H2]"))
     assert "correct its unit or factor in the channel map" in words and words in imported.out

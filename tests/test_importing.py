@@ -536,6 +536,8 @@ def test_any_text_is_a_unit_or_a_clear_error(text):
         ("Ax (g)", "g"),
         ("accel_x_g", "g"),
         ("accel_x_m_s2", "m_s2"),
+        ("supply_flow_m3_s", "m3_s"),
+        ("flow_l_min", "l_min"),
         ("H1 Press (A)", None),
         ("chamber_pressure_b", None),
         ("force_V6", None),

@@ -108,6 +108,8 @@ def _import_one(files: Sequence[Path], table: "Machine", map_: Path | None, out:
     from ..show.results import finding_entries
     from ..show.tables import print_findings
 
+    if out is not None and out.suffix != ".nc":
+        raise RecordError(f"--out {out}: a record is written, in netCDF; name it {out.stem or 'record'}.nc")
     raws = [raw for file in files for raw in load_raw(file)]
     channels = _mapped(raws, table, map_, files[0])
     record = make_imported_record(raws, channels, table.labels, table)

@@ -74,7 +74,7 @@ def parse_unit(text: str) -> Unit | None:
     spelled = re.sub(r"\s*([*/^])\s*", r"\1", text.strip().rstrip(".").replace("·", "*"))
     spelled = spelled.translate(str.maketrans("²³µ⁻", "23μ-")).strip()
     spelled = "1" if spelled == "-" else spelled
-    if re.fullmatch(r"[^\W\d_]+(_[^\W\d_]+[2-4]?)+", spelled):  # as in a column's name: m_s2
+    if re.fullmatch(r"[^\W\d_]+3?(_[^\W\d_]+[2-4]?)+", spelled):  # as in a column's name: m_s2
         spelled = spelled.replace("_", "/")
     spelled = re.sub(r"\s+", "*", spelled)
     if spelled in _PLAIN:

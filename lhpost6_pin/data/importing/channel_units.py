@@ -10,6 +10,8 @@ __all__ = ["si_factor", "time_unit", "unit_in_name", "without_unit"]
 _TIME = re.compile(
     r"(?:(?:elapsed|test|running)[\s_]*)?(?:time|zeit|temps|t)(?:[\s_]*(?P<unit>.+))?|secs?|seconds", re.I
 )
+_FLOW = re.compile(r"(?<=_)(?:[cm]?m3|l|L)_(?:s|min)$")
+"""Units of oil flow at the end of a name, whose last word alone would be one of time."""
 _VOLTAGE = ("V", "mV", "mA")
 """Units of what a converter measures: known in brackets, converted only by a gain of the map."""
 _BRACKETED = re.compile(r"(?P<name>.*?)(?P<gap>[\s_]*)(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*")
@@ -34,6 +36,8 @@ def unit_in_name(name: str) -> str | None:
         text = (match["square"] if match["round"] is None else match["round"]).strip()
         certain = match["round"] is None and match["gap"]
         return text if text and (certain or text in _VOLTAGE or quantity_unit(text)) else None
+    if match := _FLOW.search(name):
+        return match[0]
     words = name.split("_")
     ends = ("_".join(words[k:]) for k in range(1, len(words)))
     return next((end for end in ends if not end.isdigit() and quantity_unit(end)), None)

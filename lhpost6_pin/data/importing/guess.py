@@ -162,6 +162,8 @@ def _possible(source: Source, free: Sequence[str]) -> str:
     """Channels that a column of this unit could be."""
     si = quantity_unit(source.unit)
     volts = _is_voltage(source.unit)
+    reference = str(source.column).casefold().startswith("ref")  # a reference is no drive, whatever its unit
+    free = [name for name in free if not (reference and name.startswith("drive"))]
     fitting = [name for name in free if (name.startswith(_SHARE) if volts else channel_unit(name) == si)]
     return f"; by its unit: {_short(fitting)}" if fitting else ""
 

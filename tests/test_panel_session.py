@@ -177,7 +177,7 @@ def test_a_program_that_runs_is_not_replaced(panel):
     assert panel.refusals == ["a program runs; stop it first"]
     assert (panel.state.program, panel.state.state, panel.session.choice.name) == ("sine 1 Hz", "running", None)
     panel.refused({"do": "span", "axis": "x", "value": 0.8}, "exceeds the capacity")  # of the sine, still
-    assert "actuator velocity" in panel.refusals[-1] and "largest scale" in panel.refusals[-1]
+    assert "actuator velocity" in panel.refusals[-1] and "span that would fit: x 184 mm" in panel.refusals[-1]
     assert "--valves" not in panel.refusals[-1] and "flow_reading" not in panel.refusals[-1]  # which the page has not
 
 

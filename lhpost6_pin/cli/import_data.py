@@ -108,13 +108,13 @@ def _import_one(files: Sequence[Path], table: "Machine", map_: Path | None, out:
     from ..show.results import finding_entries
     from ..show.tables import print_findings
 
-    if out is not None and out.suffix != ".nc":
-        raise RecordError(f"--out {out}: a record is written, in netCDF; name it {out.stem or 'record'}.nc")
     raws = [raw for file in files for raw in load_raw(file)]
     channels = _mapped(raws, table, map_, files[0])
     record = make_imported_record(raws, channels, table.labels, table)
     path = out or Path("out") / f"{record.attrs['test'].replace('/', '_')}.nc"
     _refuse_own(path, files)
+    if path.suffix != ".nc":
+        raise RecordError(f"--out {path}: a record is written, in netCDF; name it {path.stem or 'record'}.nc")
     save_record(record, path)
     sources, findings = described_sources(raws, channels), check_dataset(record, table)
     contradictions = contradicting_sensors(table, _sound([(record, findings)]))

@@ -38,7 +38,7 @@ def check_program(plant: Plant, program: Program, gain: Array, setpoint: Array) 
         """Largest spans, in their proportion, that a scale leaves of those given."""
         sizes = [
             f"{axis} {in_page_units(rounded_down(abs(scale * g), 3), place_unit(axis))}"
-            for axis, g, moving in zip(AXES, gain, moved.value.any(axis=0), strict=True)
+            for axis, g, moving in zip(AXES, gain, np.any(moved.value, axis=0), strict=True)
             if g != 0.0 and moving
         ]
         return f"span{'s' * (len(sizes) > 1)} that would fit: {', '.join(sizes)}"

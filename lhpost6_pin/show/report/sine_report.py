@@ -148,8 +148,8 @@ def _headlines(test: SineTest) -> list[Headline]:
             f"; at all frequencies {percent(test.after.distortion_all)}",
         ),
     )
-    levels: list[Level | None] = ["good" if met else "attention" for met in _reached(test)]
-    levels[2] = levels[2] if _has_harmonics(test) else None
+    levels: list[Level] = ["good" if met else "attention" for met in _reached(test)]
+    levels[2] = levels[2] if _has_harmonics(test) else "plain"
     return [
         Headline(shown(test.after), label, f"without {shown(test.before)}{note}", level)
         for (label, shown, note), level in zip(tiles, levels, strict=True)

@@ -25,7 +25,7 @@ from lhpost6_pin.data.measured_sensors import compare_noise, find_sensors, measu
 from lhpost6_pin.data.noise_levels import noise_levels
 from lhpost6_pin.data.observable import observable
 from lhpost6_pin.data.records import load_record, make_record, sample_interval, save_record
-from lhpost6_pin.data.rests import find_rests, rest_numbers
+from lhpost6_pin.data.rests import find_rests, rest_numbers, restless
 from lhpost6_pin.data.sensors import SensorSet, add_noise, load_sensors
 from lhpost6_pin.data.signals import Band, align, differentiate
 from lhpost6_pin.data.turned_signs import turned_signs
@@ -469,3 +469,13 @@ def test_noise_of_translations_says_nothing_of_that_of_rotations(factors):
     found = find_sensors(table, [noisy], "lhpost6").noise["platen_displacement"]
     # a level is a median over some hundred bins of a short rest: within a few per cent, mean of three
     np.testing.assert_allclose(found / stated.noise["platen_displacement"], np.repeat(factors, 3), rtol=0.1)
+
+
+@pytest.mark.parametrize("shape", ["creep", "ringing"])
+def test_the_channel_that_keeps_a_record_from_resting_is_named(shape):
+    record = load_record(PRACTICE).assign_attrs(kind="measured")
+    assert restless([record]) != "platen_displacement[z]" and find_rests([record]) != [()]
+    t = record["time"].values
+    wave = 5e-3 * np.sin(0.3 * t) if shape == "creep" else 2e-3 * np.sin(12.0 * t) * (1.0 + 0.5 * np.sin(0.2 * t))
+    record["platen_displacement"].values[:, 2] += wave
+    assert find_rests([record]) == [()] and restless([record]) == "platen_displacement[z]"

@@ -15,6 +15,7 @@ from .measured_sensors import NoiseComparison, compare_noise, measured_sensors, 
 from .noise_levels import noise_levels
 from .observable import Observable, observable
 from .records import is_measured
+from .rests import restless
 from .sensors import SensorSet, load_sensors, make_sensors
 from .turned_displacement import turned_displacement
 
@@ -95,6 +96,8 @@ def check_campaign(machine: Machine, records: Sequence[xr.Dataset], sensors: str
         reason = str(error)
         if levels.hidden:
             reason += "; record two seconds of rest before and after each test, when an earlier motion has settled"
+            moving = restless(measured)
+            reason += f" ({moving} moves on where all else rests)" if moving else ""
     used = make_sensors(content) if content else None
     if known and (levels.channels or levels.hidden):  # else the records are free of noise
         used = with_measured_noise(known, measured)

@@ -14,16 +14,17 @@ import xarray as xr
 from ..core.arrays import Array, Mask
 from ..core.files import models_folder
 from ..machine.parameters import Parameters, load_parameters
-from .channels import LAYOUT, columns_of
+from .channels import LAYOUT, channel_name, columns_of
 from .conditioning import resolution
 from .records import sample_interval
 
-__all__ = ["find_rests", "rest_numbers", "seconds_of"]
+__all__ = ["find_rests", "rest_numbers", "restless", "seconds_of"]
 
 LENGTHS = ("platen_displacement", "actuator_displacement")
 """Displacements: in motion most of their power is slow."""
 
 _Key = tuple[str, int]  # channel, column
+_Blocks = dict[_Key, tuple[Array, Array, float]]  # as `_blocks`
 
 
 def rest_numbers() -> Parameters:
@@ -34,6 +35,24 @@ def rest_numbers() -> Parameters:
 def find_rests(records: Sequence[xr.Dataset], numbers: Parameters | None = None) -> list[tuple[slice, ...]]:
     """Rests of every record of a campaign, as slices of its samples; none where it never rests."""
     numbers = numbers or rest_numbers()
+    found, limits, slow = _judged(records, numbers)
+    each = [(blocks, _still(blocks, limits), record) for blocks, record in zip(found, records, strict=True)]
+    return [() if slow & set(blocks) else tuple(_runs(mask, record, numbers)) for blocks, mask, record in each]
+
+
+def restless(records: Sequence[xr.Dataset], numbers: Parameters | None = None) -> str:
+    """The channel that moves on where all others rest longest, as `platen_displacement[z]`; empty if none does."""
+    found, limits, slow = _judged(records, numbers or rest_numbers())
+    blocks = {key: sum(int(_still(b, limits, but=key).sum()) for b in found) for key in limits}
+    moving = slow or {key for key, count in blocks.items() if count == max(blocks.values()) > 0}
+    if not moving:
+        return ""
+    name, column = max(moving, key=lambda key: blocks[key])
+    return channel_name(next(record[name] for record in records if name in record), column)
+
+
+def _judged(records: Sequence[xr.Dataset], numbers: Parameters) -> tuple[list[_Blocks], dict[_Key, float], set[_Key]]:
+    """Blocks of every record, the deviation up to which each column is still, and columns that move slowly in those."""
     found = [dict(_blocks(record, numbers)) for record in records]
     quantile, factor, command = (numbers.number(f"rest.{key}") for key in ("quantile", "factor", "command"))
     limits: dict[_Key, float] = {}
@@ -46,9 +65,7 @@ def find_rests(records: Sequence[xr.Dataset], numbers: Parameters | None = None)
             allowed[key] = command * float(pooled.max())
             limits[key] = max(limits[key], allowed[key])
     still = [_still(blocks, limits) for blocks in found]
-    slow = _slow(found, still, allowed, numbers.number("rest.motion_share"))
-    each = zip(found, still, records, strict=True)
-    return [() if slow & set(blocks) else tuple(_runs(mask, record, numbers)) for blocks, mask, record in each]
+    return found, limits, _slow(found, still, allowed, numbers.number("rest.motion_share"))
 
 
 def seconds_of(records: Sequence[xr.Dataset], rests: Sequence[tuple[slice, ...]]) -> float:
@@ -85,14 +102,14 @@ def _deviations(x: Array, block: int, hop: int) -> Array:
     return np.asarray(np.lib.stride_tricks.sliding_window_view(x, block)[::hop].std(axis=1))
 
 
-def _still(blocks: dict[_Key, tuple[Array, Array, float]], limits: dict[_Key, float]) -> Mask:
-    if not blocks:
-        return np.zeros(0, bool)
-    return np.asarray(np.all([smooth <= limits[key] for key, (smooth, _, _) in blocks.items()], axis=0))
+def _still(blocks: _Blocks, limits: dict[_Key, float], but: _Key | None = None) -> Mask:
+    """Blocks in which all columns are still, `but` one that does not count."""
+    judged = [smooth <= limits[key] for key, (smooth, _, _) in blocks.items() if key != but]
+    return np.asarray(np.all(judged, axis=0)) if judged else np.zeros(0, bool)
 
 
 def _slow(
-    found: Sequence[dict[_Key, tuple[Array, Array, float]]],
+    found: Sequence[_Blocks],
     still: Sequence[Mask],
     allowed: dict[_Key, float],
     most: float,

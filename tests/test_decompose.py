@@ -125,6 +125,16 @@ def test_skews_are_taken_out_unless_asked_not_to(triangle):
     assert "aligned" in aligned.record.attrs
 
 
+def test_a_skew_beyond_the_stated_ranges_is_warned_of(triangle, caplog):
+    decompose_record(MACHINE, triangle)
+    assert "shifted back" not in caplog.text
+    late = triangle.copy(deep=True)
+    late["platen_acceleration"].values[:] = np.roll(late["platen_acceleration"].values, 10, axis=0)
+    decompose_record(MACHINE, late)
+    said = "platen_acceleration is 19.3 ms behind platen_displacement, where the sensors' ranges allow 0.6"
+    assert said in caplog.text
+
+
 def test_pressures_stand_in_for_forces(triangle):
     found = decompose_record(MACHINE, triangle.drop_vars("actuator_force"))
     assert "P_A A_1" in found.notes[0]

@@ -133,7 +133,8 @@ def main() -> None:
         except (SystemExit, Exception) as end:
             if not (end.code == _INTERRUPTED if isinstance(end, SystemExit) else _PRESSED):
                 raise
-            stderr().print("interrupted; no incomplete file is left")
+            again = "; the same command goes on from there" if sys.argv[1:2] in (["ensemble"], ["discover"]) else ""
+            stderr().print(f"interrupted; no incomplete file is left{again}")
             sys.exit(_INTERRUPTED)
 
 

@@ -164,7 +164,7 @@ def sine(
     """Run a sine without and with amplitude-phase control and harmonic cancellation; writes report.html."""
     from ..core.rounding import rounded_down
     from ..mechanics.plant import make_plant
-    from ..show.report.sine_report import write_sine_report
+    from ..show.report.sine_report import sine_verdict, write_sine_report
     from ..show.result_tables import print_sine
     from ..show.results import sine_entries
     from ..simulation.motion_limits import check_motion_limits
@@ -183,7 +183,8 @@ def sine(
     with progress_bar(f"sine in {axis} on {table.name}") as progress:
         found = sine_test(table, settings, axis=axis, amplitude=size, frequency=frequency, progress=progress)
     report = write_sine_report(found, folder / "report.html", command=repeating_command(), loop=loop)
-    print_result(json, lambda: sine_entries(found) | loop_entries(loop), lambda: print_sine(found, loop), [report])
+    verdict = dict(zip(("verdict", "level"), sine_verdict(found, loop), strict=True))
+    print_result(json, lambda: verdict | sine_entries(found) | loop_entries(loop), lambda: print_sine(found, loop), [report])
 
 
 def _amplitude(text: str, axis: str) -> float:

@@ -107,7 +107,8 @@ def with_measured_noise(sensors: SensorSet, records: Sequence[xr.Dataset]) -> Se
     """The same sensors with the noise of measured records where theirs differs from it by more than a quarter.
 
     Of six axes it is the mean of translations and of rotations, in proportion. Channels whose noise these records hide,
-    or that rest between two steps of the converter, and those that the file states free of noise, stay as stated.
+    or that rest between two steps of the converter, and those that the file states free of noise, stay as stated, as
+    does noise below an upper bound: that of records without a rest.
     """
     if not records:
         return sensors
@@ -125,7 +126,7 @@ def with_measured_noise(sensors: SensorSet, records: Sequence[xr.Dataset]) -> Se
             if one.density[varies].sum() < SHAKEN * one.quantum[varies].sum() or not due[varies].any():
                 continue
             ratio = float(np.sqrt(one.density[varies].mean() / due[varies].mean()))
-            if not 1 / most <= ratio <= most:
+            if ratio < 1 / most or (ratio > most and levels.seconds):  # an upper bound above does not contradict
                 found[name + kind] = ratio
                 sd[part] *= ratio
                 value = sd.tolist() if kind else float(sd[0])

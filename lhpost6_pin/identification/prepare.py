@@ -34,8 +34,8 @@ from ..mechanics.pose import PlatenMotion, leg_displacements
 from ..mechanics.strokes import stroke_ends
 
 __all__ = ["AS_RECORDED", "CALIBRATION", "EACH_TEST", "HALF_PLAY", "ROD_LENGTH", "SIGNIFICANT", "MeasuredTest"]
-__all__ += ["Policy", "actuator_forces", "align_records", "find_delays", "oil_forces", "chamber_pressures"]
-__all__ += ["check_usable", "prepare_noisier", "prepare_test", "source_of"]
+__all__ += ["Policy", "actuator_forces", "align_records", "chamber_pressures", "find_delays", "oil_forces"]
+__all__ += ["check_usable", "prepare_noisier", "prepare_test", "source_of", "warn_of_skews"]
 
 
 log = logging.getLogger(__name__)
@@ -178,6 +178,18 @@ def find_delays(plant: Plant, records: Sequence[xr.Dataset], policy: Policy) -> 
         if group not in policy.as_recorded
         and (policy.significance == 0.0 or abs(delay.delay) > policy.significance * delay.standard_error)
     }
+
+
+def warn_of_skews(delays: Mapping[str, Delay], sensors: SensorSet | None) -> None:
+    """Log a warning of every delay that is beyond what the stated ranges of both groups allow."""
+    for group, one in delays.items() if sensors else ():
+        most = sensors.relative_delay_range(group, one.reference) if sensors else 0.0
+        if abs(one.delay) - SIGNIFICANT.significance * one.standard_error > most:
+            where = "behind" if one.delay > 0.0 else "ahead of"
+            log.warning(
+                "%s is %.3g ms %s %s, where the sensors' ranges allow %.2g: it is shifted back; look for the cause",
+                *(group, 1e3 * abs(one.delay), where, one.reference, 1e3 * most),
+            )
 
 
 def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, policy: Policy) -> MeasuredTest:

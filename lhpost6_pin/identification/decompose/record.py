@@ -40,6 +40,7 @@ from ..prepare import (
     find_delays,
     prepare_test,
     source_of,
+    warn_of_skews,
 )
 
 __all__ = ["ComparisonBand", "Decomposed", "decompose_numbers", "decompose_record", "decompose_test"]
@@ -141,6 +142,7 @@ def decompose_record(
         require(record, *MOTION)
         sensors = None
     delays = find_delays(plant, [record], policy)
+    warn_of_skews(delays, sensors)
     test = prepare_test(plant, align_record(record, delays), sensors, policy._replace(band=band))
     whole, notes = decompose_test(mounted, test)
     if delays:

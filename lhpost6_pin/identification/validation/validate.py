@@ -30,7 +30,7 @@ from ...data.served_samples import before_trip, trip_note
 from ...machine.machine import Machine
 from ...mechanics.linearize import oil_column_modes
 from ...mechanics.plant import make_plant
-from ..prepare import SIGNIFICANT, find_delays
+from ..prepare import SIGNIFICANT, find_delays, warn_of_skews
 from .phases import PHASES, Phase, run_phase
 from .prepare_tests import ComparisonBasis, Numbers, prepare, too_short, validation_numbers
 from .spectra import Resonance, Spectrum, Valves, find_valves
@@ -98,6 +98,7 @@ def validate(
     plant = make_plant(machine)
     enough = [record for record in campaign.records if _seconds(record) >= numbers.shortest]
     skews = find_delays(plant, enough, SIGNIFICANT._replace(significance=numbers.number("comparison.significant_skew")))
+    warn_of_skews(skews, sensors)
     basis = ComparisonBasis(sensors, numbers, oil_column_modes(machine), settings)
     done, lock = [0], threading.Lock()
 

@@ -183,8 +183,9 @@ def sine(
     with progress_bar(f"sine in {axis} on {table.name}") as progress:
         found = sine_test(table, settings, axis=axis, amplitude=size, frequency=frequency, progress=progress)
     report = write_sine_report(found, folder / "report.html", command=repeating_command(), loop=loop)
-    verdict = dict(zip(("verdict", "level"), sine_verdict(found, loop), strict=True))
-    print_result(json, lambda: verdict | sine_entries(found) | loop_entries(loop), lambda: print_sine(found, loop), [report])
+    words, level = sine_verdict(found, loop)
+    entries = {"verdict": words, "level": level} | sine_entries(found) | loop_entries(loop)
+    print_result(json, lambda: entries, lambda: print_sine(found, loop), [report])
 
 
 def _amplitude(text: str, axis: str) -> float:

@@ -397,6 +397,8 @@ def test_an_effect_that_a_held_out_test_hardly_shows_stays_only_where_that_test_
         (13.5, 12.1, np.nan, None),  # thrust along the platen's normal where it hardly tilts: nothing is beyond noise
         (3.5, 13.5, np.nan, None),  # a leak, by two deviations of noise less than expected, by three more than by none
         (-1.0, 13.5, np.nan, "held_out"),
+        (-12.7, 5.5, np.nan, "held_out"),  # an inertia 40 % off, named for thrust along the normal that no test excites
+        (-5.0, 5.5, np.nan, None),  # within chance
     ],
 )
 def test_a_weak_effect_is_judged_by_what_is_beyond_noise(gain, expected, share, why):

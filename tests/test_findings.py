@@ -33,7 +33,9 @@ def test_rivals_of_one_kind_are_named_by_it():
     assert finding("local_viscous", "stray_spring").kind == ""
 
 
-def outlying(distances: dict[str, float], usual: float, deviation: float = 0.1) -> list[EffectFinding]:
+def outlying(
+    distances: dict[str, float], usual: float, deviation: float = 0.1, gone: tuple[str, ...] = ()
+) -> list[EffectFinding]:
     """Findings of a machine's parameters, all `usual` stated deviations off but some; estimates as sharp as given."""
     machine = load_machine("lhpost6")
     parameters = machine_parameters(machine)
@@ -43,7 +45,7 @@ def outlying(distances: dict[str, float], usual: float, deviation: float = 0.1) 
     problem = SimpleNamespace(machine=machine, parameters=parameters, unknowns=(), names=names, stated=stated, free={})
     found = SimpleNamespace(problem=problem, numbers=NUMBERS, solution=SimpleNamespace(x=x), added=())
     estimates = {name: Estimate(1.0, "1", 0.9, 1.1) for name in names}
-    return list(outlying_parameters(found, deviation * stated, estimates))
+    return list(outlying_parameters(found, deviation * stated, estimates, gone))
 
 
 def test_a_parameter_at_three_deviations_stands_out_among_others_near_their_values():
@@ -51,6 +53,7 @@ def test_a_parameter_at_three_deviations_stands_out_among_others_near_their_valu
     assert (one.family, len(one.components)) == ("bearing_friction", 6)
     assert outlying({"vertical.pad_friction": 2.95}, 0.9) == []  # as far off as stated deviations allow
     assert outlying({"vertical.pad_friction": 2.5}, 0.3) == []  # calibration
+    assert outlying({"vertical.pad_friction": 2.95}, 0.3, gone=("vertical.pad_friction",)) == []  # withdrawn
     assert outlying({"vertical.pad_friction": 2.95}, 0.3, deviation=0.6) == []  # hardly told
 
 

@@ -5,7 +5,7 @@ all others that the campaign informs on scatter by a fraction of it, has changed
 family. Where others are as far off, stated deviations are too small, and none stands out.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -19,8 +19,12 @@ from .search_state import Search
 __all__ = ["outlying_parameters"]
 
 
-def outlying_parameters(found: Search, sd: Array, estimates: Mapping[str, Estimate]) -> Iterator[EffectFinding]:
+def outlying_parameters(
+    found: Search, sd: Array, estimates: Mapping[str, Estimate], gone: Collection[str] = ()
+) -> Iterator[EffectFinding]:
     """Findings of parameters that stand out; sd (p,) are deviations of the unknowns, `estimates` theirs in their units.
+
+    None of those that are `gone`: freed by a search, and no findings.
 
     None on guides, where few parameters are informed and priors are assumed.
     """
@@ -37,7 +41,7 @@ def outlying_parameters(found: Search, sd: Array, estimates: Mapping[str, Estima
     for i in informed:
         others = [k for k in informed if k != i]
         name, reach = problem.names[i], n("outlying.reach") * sd[i] / problem.stated[i]
-        if name not in releases or len(others) < n("outlying.fewest"):
+        if name in gone or name not in releases or len(others) < n("outlying.fewest"):
             continue
         usual = float(np.sqrt(np.mean(distance[others] ** 2)))
         if abs(distance[i]) + reach >= n("outlying.far") and abs(distance[i]) >= n("outlying.apart") * usual:

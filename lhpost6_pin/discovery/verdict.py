@@ -108,7 +108,7 @@ def judge(
     drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of its mount
     unexplained = function is not None or bool(rejected) or drifting or more_than_noise(found)
     nearest = tuple(one.candidate.family.named for one in kept if one.candidate.name in rejected)
-    outlying = tuple(one for one in outlying_parameters(found, sd, estimates) if gone.isdisjoint(one.parameters))
+    outlying = tuple(outlying_parameters(found, sd, estimates, gone))
     identified = [_of_added(one, estimates) for one in kept if one.candidate.name not in rejected | gone]
     effects = _merged([*identified, *outlying])
     left = found.bare if gone and not effects and more_than_noise(found.bare) else found

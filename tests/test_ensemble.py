@@ -115,6 +115,16 @@ def test_demand_proportional_to_scale_reaches_capacity_at_its_own_scale(capacity
     np.testing.assert_allclose(found[~near], expected[~near], rtol=1e-9)
 
 
+def test_demand_that_saturates_between_two_scales_reaches_capacity_in_proportion_to_the_lower_one():
+    """Actuator velocity of six machines at 1.2 and 1.6: between them, at 1.35, all were beyond."""
+    scales, at = np.array([1.2, 1.6]), np.array([[0.978, 0.920, 0.957, 0.911], [1.046, 1.041, 1.048, 1.039]])
+    found = critical_scales(at, scales)
+    np.testing.assert_allclose(found, 1.2 / at[0], rtol=1e-12)
+    assert (found < 1.35).all()
+    steeper = critical_scales(np.array([[0.6], [1.4]]), np.array([1.0, 2.0]))  # an offset that grows: linear
+    assert steeper == pytest.approx([1.5])
+
+
 def test_a_missing_run_before_a_limit_is_reached_leaves_its_machine_out():
     use = np.array([[0.2, np.nan, 0.2, 0.2], [0.8, 1.2, np.nan, 1.5], [1.2, 1.5, 1.5, np.inf]])
     found = critical_scales(use, np.array([1.0, 2.0, 3.0]))
@@ -454,6 +464,15 @@ def test_a_saturated_limit_is_reached_between_two_scales_and_not_at_the_upper_on
     assert risk_table(found).rows[0][1] == "1.2 to 1.6"
     rising = exceedance("push", critical_scales(1.1 * use, scales), scales, level=0.05, confidence=0.95)
     assert rising.risk_after == 0.0 and 1.2 < rising.risk_scale < 1.6
+
+
+def test_the_scale_of_a_risk_is_rounded_down():
+    """5 % "at scale 1.2" stood beside a probability of 17 % at scale 1.2: it was 1.1975."""
+    scales = np.array([0.8, 1.2, 1.6])
+    use = np.array([[0.6653, *[0.6] * 5], [1.0021, *[0.9] * 5], [1.4, *[1.2] * 5]])
+    one = exceedance(ANY, critical_scales(use, scales), scales, level=0.05, confidence=0.95)
+    found = _summary(Configuration("ridgecrest", "none", "tuned", (one,)))
+    assert "5 % at scale 1.19 (" in ensemble_verdict(found) and risk_table(found).rows[0][1] == "1.19"
 
 
 def test_results_name_the_one_scale_that_they_are_of():

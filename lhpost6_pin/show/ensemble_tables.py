@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.rounding import rounded_down
 from ..studies.exceedance import ANY, Exceedance
 from ..studies.summary import Configuration, EnsembleSummary, ImportanceOf, Spread
 from .report.page import Table, number
@@ -66,15 +67,15 @@ def _risk_words(one: Exceedance, found: EnsembleSummary) -> str:
     if one.where == "at or below the smallest run":
         return f"{risk} or more at scale {found.scales[0]:g} already, the smallest run"
     if one.risk_after:
-        return f"{risk} between the scales {one.risk_after:.3g} and {one.risk_scale:.3g}"
-    low = f"{one.risk_low:.3g} to " if one.risk_low else "too few machines for a lower bound; up to "
-    return f"{risk} at scale {one.risk_scale:.3g} ({low}{_end(one.risk_high)})"
+        return f"{risk} between the scales {one.risk_after:.3g} and {_end(one.risk_scale)}"
+    low = f"{_end(one.risk_low)} to " if one.risk_low else "too few machines for a lower bound; up to "
+    return f"{risk} at scale {_end(one.risk_scale)} ({low}{_end(one.risk_high)})"
 
 
 def _of_one_machine(one: Exceedance, found: EnsembleSummary) -> str:
     """Where the only machine reaches a limit; no risk can be stated of it."""
     scale, least, most = float(one.critical[0]), found.scales[0], found.scales[-1]
-    where = f"at scale {scale:.3g}"
+    where = f"at scale {_end(scale)}"
     if math.isinf(scale):
         where = f"at no scale up to {most:g}, the largest run"
     elif scale <= least:
@@ -84,7 +85,8 @@ def _of_one_machine(one: Exceedance, found: EnsembleSummary) -> str:
 
 
 def _end(scale: float) -> str:
-    return "beyond the largest" if math.isinf(scale) else f"{scale:.3g}"
+    """A scale to three digits, never above it but for rounding of the last bit: at that scale the risk is no larger."""
+    return "beyond the largest" if math.isinf(scale) else f"{rounded_down(scale * (1.0 + 1e-12), 3):g}"
 
 
 def risk_table(found: EnsembleSummary) -> Table:

@@ -1,7 +1,8 @@
 """Probability of exceeding a limit against the scale of a motion, and the scale at which it reaches a stated risk.
 
 Every machine of an ensemble runs at every scale; its demand over capacity reaches one at its critical scale,
-interpolated linearly between the two about it. Their distribution is a fragility curve: the share of critical scales up
+interpolated linearly between the two about it, or in proportion to the scale from the lower one where it grows by less
+than that: there valves saturate before the upper one. Their distribution is a fragility curve: the share of critical scales up
 to a scale estimates the probability of exceedance there (Wilson intervals), and their quantiles are the scales of given
 risk (distribution-free intervals of order statistics). Intervals are those of independent draws; of a Latin hypercube
 or a Sobol sequence they are somewhat too wide.
@@ -55,6 +56,8 @@ def critical_scales(use: Array, scales: Array) -> Array:
             before, after = use[k - 1, i], use[k, i]
             part = (1.0 - before) / (after - before) if np.isfinite(after) else 1.0
             found[i] = scales[k - 1] + part * (scales[k] - scales[k - 1])
+            if 1.0 < after < np.inf and before > 0.0:  # a clipped command is at most one: the upper scale
+                found[i] = min(found[i], scales[k - 1] / before)
     return found
 
 

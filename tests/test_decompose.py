@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from lhpost6_pin.identification.inverse_dynamics import leg_wrenches
 from lhpost6_pin.show.report.decompose_plots import moved_axes
 from lhpost6_pin.show.report.decompose_report import (
     _headlines,
+    _verdict,
     match_tables,
     residual_tables,
     write_decompose_report,
@@ -59,6 +61,18 @@ def test_a_simulated_record_at_the_model_step_comes_apart_exactly_and_slower_as_
     agreement = find_agreement(exact)
     assert np.nanmax(agreement.actuators.rrmse) < 1e-8 and not agreement.noise.any()
     assert set(agreement.varying_explained) == {"none needed"}
+
+
+def test_without_noise_an_axis_that_bears_no_force_is_not_judged(clean):
+    """A record along x was bad by 2.4e-02 of the force about roll: 0.02 N m of rounding over none."""
+    whole = decompose_record(MACHINE, clean)
+    forces = SimpleNamespace(measured=whole.forces.measured.copy(), residual=whole.forces.residual.copy())
+    found = SimpleNamespace(plant=whole.plant, sensors=None, forces=forces)
+    forces.measured[:, 3], forces.residual[:, 3] = 0.0, 5.0  # N m
+    words, level = _verdict(found, None)
+    assert level == "good" and "(x, y, z, pitch, yaw; the others bear none)" in words
+    forces.residual[:, 0] += 1e4
+    assert _verdict(found, None)[1] == "bad"
 
 
 def test_the_card_of_the_worst_error_says_of_which_axes_it_is(practice):

@@ -19,6 +19,8 @@ from hypothesis import strategies as st
 from lhpost6_pin.core.errors import RecordError
 from lhpost6_pin.core.units import quantity_unit
 from lhpost6_pin.data import channels as channels_module
+from lhpost6_pin.data.check import check_dataset
+from lhpost6_pin.data.filled_samples import stated_constants
 from lhpost6_pin.data.importing import (
     ChannelMap,
     Source,
@@ -661,6 +663,10 @@ def test_a_channel_that_is_known_to_be_zero_is_said_to_be_stated():
     assert (record["platen_displacement"].sel(axis="z") == 0.0508).all()
     np.testing.assert_array_equal(record["platen_displacement"].sel(axis="x"), 1e-3 * VALUES[:, 0])
     assert "platen_displacement[yaw]" in record.attrs["constant"]
+    assert stated_constants(record) == zero.keys() and not stated_constants(record.drop_attrs())
+    measured = record.assign_attrs(kind="measured")  # no sensor to check, nor to omit
+    assert not any("is constant" in one.message for one in check_dataset(measured))
+    assert any("is constant" in one.message for one in check_dataset(measured.assign_attrs(constant="")))
 
 
 def test_a_force_that_was_not_measured_is_not_written_and_one_written_before_is_not_read(tmp_path):

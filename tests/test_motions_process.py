@@ -450,3 +450,9 @@ def test_impossible_oscillators_are_refused(step, period, damping):
 def test_a_translation_is_no_rotation(axes):
     with pytest.raises(MotionError, match="metres are no radians"):
         make_target(find_motion("sfu-like"), axes=axes)
+
+
+def test_a_motion_of_hours_is_refused_before_anything_is_built():
+    """50 m for 50 mm: a triangle of 100 minutes."""
+    with pytest.raises(MotionError, match="correct the time step or the size that sets its length"):
+        make_target(find_motion("triangle", amplitude=50.0))

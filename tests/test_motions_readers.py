@@ -169,6 +169,13 @@ def test_the_word_of_a_quantity_before_its_unit_is_no_part_of_the_unit(tmp_path,
         load_motion(written(tmp_path, "n.csv", "time_s,X Accel\n0,0\n0.01,0.5\n"))
 
 
+@pytest.mark.parametrize("mark", ["\t", ",", ";"])
+def test_names_with_blanks_are_separated_by_their_mark(tmp_path, mark):
+    rows = [("Time (s)", "Acc X (g)", "Acc Y (g)"), (0, 0, 0), (0.01, 0.5, 0.25), (0.02, 0, 0)]
+    motion = load_motion(written(tmp_path, "m.txt", "".join(mark.join(map(str, row)) + "\n" for row in rows)))
+    assert motion.samples[1, :2] == pytest.approx([0.5 * 9.80665, 0.25 * 9.80665])
+
+
 def test_a_gap_in_time_is_named_where_it_is(tmp_path):
     """A gap moves the mean step, by which every step of the file would be wrong; it does not move the median."""
     time = [0.01 * k for k in range(300)] + [3.5 + 0.01 * k for k in range(700)]

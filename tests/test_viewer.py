@@ -236,6 +236,8 @@ def test_records_of_different_motions_are_not_the_same_test(record):
     found = compare_overlaid(record, [scaled, turned, still], ["a", "scaled", "turned", "still"])
     assert len(found.different) == 2 and found.different[0].startswith("turned is not the same test as a: the corr")
     assert found.different[1] == "still is not the same test as a: one of them is at rest"
+    driven = turned.drop_vars("reference_displacement", errors="ignore").assign_attrs(spool_interpolation="held")
+    assert not compare_overlaid(record, [driven], ["a", "driven by its spools"]).different  # it drifts
     named = compare_overlaid(record.assign_attrs(motion="sine"), [record.assign_attrs(motion="kobe")], ["a", "b"])
     assert named.different == ("b is not the same test as a: its motion is kobe, not sine",)
 

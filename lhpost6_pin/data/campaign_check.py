@@ -11,6 +11,7 @@ from ..machine.parameters import Parameters
 from ..mechanics.plant import make_plant
 from .channels import LAYOUT
 from .consistency import ConsistencyFinding, check_sensors
+from .filled_samples import stated_constants
 from .measured_sensors import NoiseComparison, compare_noise, measured_sensors, with_measured_noise
 from .noise_levels import noise_levels
 from .observable import Observable, observable
@@ -101,6 +102,8 @@ def check_campaign(machine: Machine, records: Sequence[xr.Dataset], sensors: str
     used = make_sensors(content) if content else None
     if known and (levels.channels or levels.hidden):  # else the records are free of noise
         used = with_measured_noise(known, measured)
+    findings = None if used is None else check_sensors(plant, measured, used)
+    constant = frozenset[str]().union(*map(stated_constants, measured))
     present = [name for name in LAYOUT if all(name in r for r in measured)]
     return CampaignCheck(
         rate=levels.rate,
@@ -108,7 +111,7 @@ def check_campaign(machine: Machine, records: Sequence[xr.Dataset], sensors: str
         source=levels.source,
         stated=known.name if known else "",
         noise=compare_noise(levels, known),
-        findings=None if used is None else check_sensors(plant, measured, used),
+        findings=findings and tuple(one for one in findings if one.channel not in constant),
         observable=observable(machine, present),
         content=content,
         reason=reason,

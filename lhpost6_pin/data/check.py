@@ -21,7 +21,7 @@ from ..machine.recorded_changes import changes_summary
 from .alignment import hydraulic_force
 from .channels import LAYOUT, channel_name, channel_unit, columns_of, unit_doubt
 from .conditioning import resolution
-from .filled_samples import filled_samples, longest_measured
+from .filled_samples import filled_samples, longest_measured, stated_constants
 from .force_units import wrong_forces
 from .layout_faults import RecordFinding, layout_faults
 from .motion_pairs import GAIN_TOLERANCE, inconsistent_motion
@@ -70,7 +70,8 @@ def check_dataset(dataset: xr.Dataset, machine: Machine | None = None) -> list[R
         return errors + contents  # signals cannot be judged on a broken time axis
     sound = dataset[[*known]].astype(float).assign_attrs(dataset.attrs)
     judged, stretch = judged_samples(dataset) & ~filled_samples(dataset), longest_measured(dataset)
-    columns = tuple(c for c in _columns(sound, known, judged) if not _held(c, machine))
+    constant = stated_constants(dataset)
+    columns = tuple(c for c in _columns(sound, known, judged) if not (_held(c, machine) or c.channel in constant))
     by_column = (_implausible_unit, _starts_in_motion, _saturated_spool, _frozen, _spike)
     as_recorded = sound = sound.isel(time=stretch)
     turned: list[RecordFinding] = []

@@ -1,4 +1,7 @@
-"""Samples of a record that were missing and are interpolated (`fill_gaps`): no sensor is judged by them."""
+"""What of a record was not measured: interpolated samples (`fill_gaps`) and constants of a map.
+
+No sensor is judged by them.
+"""
 
 import re
 
@@ -7,7 +10,10 @@ import xarray as xr
 
 from ..core.arrays import Mask
 
-__all__ = ["FILLED", "filled_samples", "longest_measured", "stated_runs"]
+__all__ = ["CONSTANT", "FILLED", "filled_samples", "longest_measured", "stated_constants", "stated_runs"]
+
+CONSTANT = "constant"
+"""Attribute of a record: channels, as `platen_acceleration[roll]`, that a map gives as constants, behind a colon."""
 
 FILLED = "filled_samples"
 """Attribute of a record: runs of interpolated samples, as in `100 from 3000, 5 from 4000`."""
@@ -32,3 +38,9 @@ def longest_measured(record: xr.Dataset) -> slice:
     edges = np.flatnonzero(np.diff(np.concatenate([[True], filled_samples(record), [True]])))
     runs = edges.reshape(-1, 2)
     return slice(*runs[np.argmax(np.diff(runs, axis=1))].tolist()) if len(runs) else slice(None)
+
+
+def stated_constants(record: xr.Dataset) -> frozenset[str]:
+    """Channels of a record that are constants of its map, as `platen_acceleration[roll]`."""
+    names = str(record.attrs.get(CONSTANT, "")).partition(": ")[2]
+    return frozenset(names.split(", ")) if names else frozenset()

@@ -96,7 +96,8 @@ def header_names(header: str) -> tuple[list[str], Dialect]:
     dialect = Dialect(next((mark for mark in ";\t," if mark in header), " "))
     if dialect.separator == " " and _COLUMN.fullmatch(header.strip()):  # one column, a blank before its unit
         dialect = Dialect(",")
-    return [field.strip().strip('"') for field in header.strip().split(dialect.separator.strip() or None)], dialect
+    fields = header.strip().split(None if dialect.separator == " " else dialect.separator)
+    return [field.strip().strip('"') for field in fields], dialect
 
 
 def _columns(names: list[str], clock: int | None, channels: Channels | None, where: str) -> dict[str, int]:

@@ -29,8 +29,8 @@ __all__ = ["Reference", "Target", "axes_map", "make_target", "processing", "smoo
 
 _log = logging.getLogger(__name__)
 
-_MOST = 2**24
-"""Samples that a target may have: more than two hours at 2048 Hz, and 0.8 GB an array."""
+_MOST = 2**22
+"""Samples that a target may have: half an hour at 2048 Hz, of which a run needs some 14 GB."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ def make_target(
     if max(span / motion.time_step, span * rate) > _MOST:
         raise MotionError(
             f"{motion.name}: {span:g} s with a time step of {motion.time_step:g} s are more than {_MOST} samples; "
-            "correct the time step, or cut a window"
+            "correct the time step or the size that sets its length, or cut a window"
         )
     # both the record's first sample and the period fall on samples of the target
     ends = _multiple(round(memory / motion.time_step) + 1, step.denominator)

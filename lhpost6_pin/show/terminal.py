@@ -2,8 +2,9 @@
 
 import re
 
-from rich.console import JustifyMethod
+from rich.console import Console, JustifyMethod
 from rich.markup import escape
+from rich.measure import Measurement
 from rich.table import Table as RichTable
 from rich.text import Text
 
@@ -14,6 +15,8 @@ __all__ = ["print_blocks"]
 
 _PADDING, _LEAST = 3, 12
 """Characters about a column, and the least of one that wraps."""
+_WIDEST = 10_000
+"""Characters of a line that no table has."""
 
 _NUMBER = re.compile(r"^$|[<~!▲+±−–-]|\d")
 
@@ -23,10 +26,17 @@ def print_blocks(*blocks: str | Text | Table | Figure) -> None:
     console = make_console()
     for block in blocks:
         if isinstance(block, Table):
-            console.print(_rich(block, console.width))
+            width = console.width if console.is_terminal else max(console.width, _natural_width(block))
+            (console if width == console.width else Console(width=width)).print(_rich(block, width))
         elif isinstance(block, str | Text) and block:
             words = plain_text(block) if isinstance(block, Markup) else block
             console.print(words, markup=False, highlight=False, soft_wrap=True)
+
+
+def _natural_width(table: Table) -> int:
+    """Characters of a table without wrapped cells: in a file or a pipe none is cut off."""
+    options = make_console().options.update(width=_WIDEST)
+    return Measurement.get(Console(width=_WIDEST), options, _rich(table, _WIDEST)).maximum
 
 
 def _rich(table: Table, width: int) -> RichTable:

@@ -202,7 +202,7 @@ def _target(numbers: Parameters, test: str, machine: Machine, factor: float) -> 
     own = None if machine.motion == "free" else machine.motion
     if own and motion.axes and not set(own) & set(motion.axes):  # held by the guides: move a free one
         own = f"{own[0]}={motion.axes[0]}"
-    return make_target(motion, scale=scale, axes=own, rate=float(SAMPLE_RATE))
+    return make_target(motion, scale=scale, axes=own, rate=float(SAMPLE_RATE), warn=False)
 
 
 def draw_errors(record: xr.Dataset, sensors: SensorSet, rng: np.random.Generator) -> SensorErrors:

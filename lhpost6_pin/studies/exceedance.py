@@ -2,10 +2,10 @@
 
 Every machine of an ensemble runs at every scale; its demand over capacity reaches one at its critical scale,
 interpolated linearly between the two about it, or in proportion to the scale from the lower one where it grows by less
-than that: there valves saturate before the upper one. Their distribution is a fragility curve: the share of critical scales up
-to a scale estimates the probability of exceedance there (Wilson intervals), and their quantiles are the scales of given
-risk (distribution-free intervals of order statistics). Intervals are those of independent draws; of a Latin hypercube
-or a Sobol sequence they are somewhat too wide.
+than that: there valves saturate before the upper one. Their distribution is a fragility curve: the share of critical
+scales up to a scale estimates the probability of exceedance there (Wilson intervals), and their quantiles are the
+scales of given risk (distribution-free intervals of order statistics). Intervals are those of independent draws; of a
+Latin hypercube or a Sobol sequence they are somewhat too wide.
 """
 
 from typing import Literal, NamedTuple

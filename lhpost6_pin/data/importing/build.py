@@ -16,7 +16,7 @@ from ...mechanics.accelerometers import accelerometer_rows
 from ...mechanics.plant import make_plant
 from ..accelerometers import accelerometer_channel, with_platen_acceleration
 from ..channels import LAYOUT, channel_unit
-from ..filled_samples import FILLED, stated_runs
+from ..filled_samples import CONSTANT, FILLED, stated_runs
 from ..records import make_record
 from .channel_map import ChannelMap, channels_of, check_map, find_column, still_channels, with_labels
 from .channel_units import si_factor
@@ -85,7 +85,7 @@ def make_imported_record(
         attrs["filled"] = "interpolated samples: " + "; ".join(filled)
         attrs[FILLED] = stated_runs(missing)
     if constant:
-        attrs["constant"] = "not measured, stated in the map: " + ", ".join(constant)
+        attrs[CONSTANT] = "not measured, stated in the map: " + ", ".join(constant)
     if "point_acceleration" in variables:
         rows = accelerometer_rows(_accelerometers(channels, labels["accelerometer"], machine))
         variables["point_acceleration"] = accelerometer_channel(rows, variables["point_acceleration"])

@@ -4,6 +4,7 @@ Values are drawn as they are given, in the unit that a panel's title names; enve
 """
 
 import html
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -18,7 +19,7 @@ from .plots import packed
 from .scales import Scale
 
 __all__ = ["Curve", "Panel", "Plot", "XAxis", "chart_figure", "frequency_axis", "grid_figure"]
-__all__ += ["matrix_figure", "spectra_figure"]
+__all__ += ["matrix_figure", "spectra_figure", "with_peaks"]
 
 TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # [Hz]
 BAND_COLOR = "#009e73"
@@ -38,6 +39,12 @@ class Curve:
     y: ArrayLike
     style: Mapping[str, Any]  # plotly line
     kind: str = "lines"  # or "lines+markers", "markers", "bar"
+
+
+def with_peaks(span: tuple[float, float], curves: Sequence[Curve]) -> tuple[float, float]:
+    """A span [dB] whose upper end, in steps of three, leaves no peak of the curves out."""
+    top = max((float(np.nanmax(np.asarray(c.y, float), initial=span[1])) for c in curves), default=span[1])
+    return span[0], max(span[1], 3.0 * math.ceil(top / 3.0)) if math.isfinite(top) else span[1]
 
 
 @dataclass(frozen=True)

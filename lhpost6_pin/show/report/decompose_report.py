@@ -15,6 +15,7 @@ from .scales import force_scale, percent, shown_as
 
 __all__ = ["match_tables", "residual_tables", "write_decompose_report"]
 
+LOADED = 1e-3  # of the largest force of its kind, up to which an axis bears none and is not judged without noise
 EXACT = 1e-3  # fraction of the measured force below which the residual of a noise-free record counts as small
 MATCH = (
     "RRMSE = √(Σ error² ∕ Σ measured²); mean removed: from both. Delay: of the modelled behind the measured force "
@@ -75,10 +76,15 @@ def write_decompose_report(
 def _verdict(found: Decomposed, agreement: WrenchAgreement) -> tuple[str, Level]:
     axes = found.plant.axes
     if found.sensors is None:
-        residual = np.abs(found.forces.residual).max(axis=0)[axes]
-        share = float(np.max(residual / np.maximum(np.abs(found.forces.measured).max(axis=0)[axes], 1.0)))
-        words = f"Noise-free record: the residual is at most {share:.1e} of the largest measured force of its axis."
-        return words, "good" if share < EXACT else "bad"
+        residual, measured = (np.abs(x).max(axis=0) for x in (found.forces.residual, found.forces.measured))
+        most = np.repeat([measured[:3].max(), measured[3:].max()], 3)
+        judged = [k for k in axes if measured[k] > max(LOADED * most[k], 1.0)]
+        if not judged:
+            return "Noise-free record without forces: there is nothing to compare.", "attention"
+        share = max(float(residual[k] / measured[k]) for k in judged)
+        named = "" if len(judged) == len(axes) else f" ({', '.join(AXES[k] for k in judged)}; the others bear none)"
+        what = f"the residual is at most {share:.1e} of the largest measured force of its axis{named}"
+        return f"Noise-free record: {what}.", "good" if share < EXACT else "bad"
     varying, offset = agreement.varying_explained, agreement.offset_explained
     by = {kind: ", ".join(AXES[k] for k in axes if varying[k] == kind) for kind in EXPLANATIONS}
     words = "; ".join(f"in {names} {EXPLANATIONS[kind][1]}" for kind, names in by.items() if names)

@@ -7,7 +7,7 @@ from ...data.metrics import channel, commanded_axes, labels, sampling
 from ...data.motion_measures import DAMPING
 from ...motions.response_spectra import response_spectrum
 from ...tuning.interaction import Interaction
-from .charts import Curve, Panel, chart_figure, frequency_axis
+from .charts import Curve, Panel, chart_figure, frequency_axis, with_peaks
 from .page import Block, Table, grid, number
 from .plots import palette
 from .scales import axis_scale, axis_title, decibels, percent, shown_as
@@ -15,7 +15,7 @@ from .scales import axis_scale, axis_title, decibels, percent, shown_as
 __all__ = ["interaction_blocks", "period_table"]
 
 BAND = (0.1, 40.0)  # [Hz] drawn
-GAINS = (-24.0, 12.0)  # [dB] drawn
+GAINS = (-24.0, 12.0)  # [dB] drawn, and peaks above
 
 
 def interaction_blocks(record: xr.Dataset, found: Interaction) -> list[Block]:
@@ -45,7 +45,7 @@ def interaction_blocks(record: xr.Dataset, found: Interaction) -> list[Block]:
             f, one = found.frequency[part], response[part, k]
             size.append(Curve(name, f, 20.0 * np.log10(np.maximum(np.abs(one), 1e-6)), line))
             turn.append(Curve(name, f, np.degrees(np.unwrap(np.angle(one))), line))
-        panels = [Panel("Magnitude [dB]", size, span=GAINS), Panel("Phase [deg]", turn)]
+        panels = [Panel("Magnitude [dB]", size, span=with_peaks(GAINS, size)), Panel("Phase [deg]", turn)]
         marks = [mode.frequency for mode in found.modes[:6] if BAND[0] < mode.frequency < BAND[1]]
         words = "Vertical lines: modes of the specimen on a fixed base." if marks else "Linear model."
         title = axis_title(axis)

@@ -8,7 +8,7 @@ from ...core.arrays import Array, Complex, Mask
 from ...data.transfer import Transfer
 from ...tuning.identify import tuning_numbers
 from ...tuning.tune import Tuning
-from .charts import Curve, Panel, chart_figure, frequency_axis
+from .charts import Curve, Panel, chart_figure, frequency_axis, with_peaks
 from .control_blocks import AXIS_LINES
 from .page import Figure
 from .plots import AFTER, BEFORE, BLACK
@@ -19,7 +19,7 @@ __all__ = ["bode_figure", "overview_figure"]
 BAND = (0.1, 40.0)  # [Hz] drawn
 MODEL = {"color": BLACK, "width": 1.0, "dash": "dash"}
 MODEL_POINTS = 500  # of the linear model's response that are drawn, at most
-GAINS = (-12.0, 9.0)  # [dB] drawn
+GAINS = (-12.0, 9.0)  # [dB] drawn, and peaks above
 ROW = 130  # [CSS px]
 
 
@@ -37,7 +37,7 @@ def bode_figure(tuning: Tuning, a: int) -> Figure:
     size, undelayed, measured = zip(*curves, strict=True)
     band = (-tuning.tolerance, tuning.tolerance)
     panels = [
-        Panel("Magnitude [dB]", size, span=GAINS, band=band),
+        Panel("Magnitude [dB]", size, span=with_peaks(GAINS, size), band=band),
         Panel("Phase, common delay removed [deg]", undelayed, span=(-90.0, 90.0)),
         Panel("Phase as measured [deg]", measured),
         Panel("Coherence", coherent, span=(0.0, 1.05), lines={f"{tuning.coherence:g}": tuning.coherence}),
@@ -56,7 +56,7 @@ def overview_figure(tuning: Tuning) -> Figure:
             f, part = _drawn(transfer.frequency)
             curves.append(Curve(axis.axis, f, _decibels(transfer.response[part, 0, 0]), AXIS_LINES[axis.axis]))
         band = (-tuning.tolerance, tuning.tolerance)
-        panels.append(Panel(f"Magnitude {name} [dB]", curves, span=GAINS, band=band))
+        panels.append(Panel(f"Magnitude {name} [dB]", curves, span=with_peaks(GAINS, curves), band=band))
     words = f"Reference to achieved acceleration of each axis; the shaded band is ±{tuning.tolerance:g} dB."
     title = "All axes before and after"
     if not tuning.was_stable:

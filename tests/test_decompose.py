@@ -11,6 +11,7 @@ from run_cases import RATE, every_step
 from sensor_cases import measured
 
 from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.data.filled_samples import between_gaps
 from lhpost6_pin.data.records import load_record, open_record, sample_interval
 from lhpost6_pin.data.sensors import add_noise, load_sensors
 from lhpost6_pin.identification.decompose import decompose_record, find_agreement, find_work, save_ledger
@@ -273,3 +274,22 @@ def test_the_tutorial_names_the_tables_and_columns_that_are_printed(practice):
     assert named == sorted(named)
     assert all(f"*{column}*" in page for column in ("Ratio", "Sensors", "Parameters", "Sufficient explanation"))
     assert set(tables[0].header) >= {"Ratio", "Sensors", "Parameters", "Sufficient explanation"}
+
+
+def test_a_record_with_a_long_gap_that_was_filled_is_compared_in_its_longest_stretch(triangle, caplog):
+    """Interpolated samples were residuals: an effect "missing" in every axis, and healthy sensors "suspicious"."""
+    gap = slice(2000, 2100)
+    broken = triangle.copy(deep=True)
+    for name in broken.data_vars:  # as an import fills it, but for the spline
+        values = broken[name].values
+        values[gap] = np.linspace(values[gap.start], values[gap.stop], 100, endpoint=False)
+    filled = broken.assign_attrs(filled_samples="100 from 2000")
+    found = decompose_record(MACHINE, filled)
+    assert "100 samples are interpolated" in caplog.text and any("longest stretch" in note for note in found.notes)
+    assert (
+        find_agreement(found).noise_ratio.max()
+        < 1.5
+        < find_agreement(decompose_record(MACHINE, broken)).noise_ratio.max()
+    )
+    short = triangle.assign_attrs(filled_samples="10 from 2000")  # 0.02 s
+    assert between_gaps(short) is short

@@ -168,6 +168,10 @@ def test_a_phase_at_its_floor_before_any_effect_is_no_evidence():
     for after, evidence in ((0.4, "and the balances are the evidence"), (0.98, "nor do their balances show it")):
         found.balances = (Balance("wrench", "EQ", (1.2, 1.0, after)),)
         assert evidence in floor_note(found)
+    found.proof = SimpleNamespace(
+        gaps=(Gap("closed loop", "EQ", 1.4, 1.1, 1.0, 1.1), Gap("open loop", "EQ", 9.0, 5.0, 1.1, 1.0))
+    )
+    assert "and the other phases are the evidence" in floor_note(found)  # the balances, last, do not show it
 
 
 def test_what_a_refit_explains_a_fall_of_the_error_by_is_stated(monkeypatch):

@@ -272,7 +272,7 @@ def _odd_rates(dataset: xr.Dataset) -> Iterator[_Warning]:
     count, rate = dataset.sizes["time"], 1 / sample_interval(dataset)
     if not 200 <= rate <= 1e5:
         what = f"runs at {rate:g} Hz; 256 to 8192 Hz are usual"
-        yield "time", None, what, "record faster, or check the unit of time"
+        yield "time", None, what, "record faster, or check the unit of time" if rate < 200 else "check the unit of time"
     if count < 256:
         return
     every = np.ones(count, bool)

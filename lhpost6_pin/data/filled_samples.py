@@ -3,6 +3,7 @@
 No sensor is judged by them.
 """
 
+import logging
 import re
 
 import numpy as np
@@ -10,7 +11,13 @@ import xarray as xr
 
 from ..core.arrays import Mask
 
-__all__ = ["CONSTANT", "FILLED", "filled_samples", "longest_measured", "stated_constants", "stated_runs"]
+__all__ = ["CONSTANT", "FILLED", "between_gaps", "filled_samples", "longest_measured", "stated_constants"]
+__all__ += ["stated_runs"]
+
+log = logging.getLogger(__name__)
+
+LONGEST_FILLED = 0.04
+"""Gap [s] whose interpolation is as good as measured in the bands compared, up to half a period of 12 Hz."""
 
 CONSTANT = "constant"
 """Attribute of a record: channels, as `platen_acceleration[roll]`, that a map gives as constants, behind a colon."""
@@ -33,9 +40,40 @@ def filled_samples(record: xr.Dataset) -> Mask:
     return mask
 
 
+def between_gaps(record: xr.Dataset) -> xr.Dataset:
+    """The longest stretch of a record without a gap that is too long to be interpolated, as its attribute `gap` says.
+
+    The cut is logged as a warning with the test's name.
+    """
+    filled = filled_samples(record)
+    if not filled.any():
+        return record
+    time = record["time"].values
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], filled, [False]]))).reshape(-1, 2)
+    most = LONGEST_FILLED * (len(time) - 1) / (time[-1] - time[0])
+    long = [(first, last) for first, last in edges.tolist() if last - first > most]
+    if not long:
+        return record
+    gap = np.zeros(len(time), bool)
+    for first, last in long:
+        gap[first:last] = True
+    part = _longest(~gap)
+    lost = f"{int(gap.sum())} samples are interpolated, in gaps of more than {LONGEST_FILLED:g} s"
+    kept = f"{lost}: only {time[part][0]:.5g} to {time[part][-1]:.5g} s, the longest stretch between them, are used"
+    log.warning("test %s: %s", record.attrs.get("test", "test"), kept)
+    cut = record.isel(time=part).assign_attrs({"gap": kept, FILLED: stated_runs(filled[part])})
+    cut.encoding = dict(record.encoding)  # with the file's name
+    return cut
+
+
 def longest_measured(record: xr.Dataset) -> slice:
     """The longest run of samples without interpolated ones; all where there are none."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], filled_samples(record), [True]])))
+    return _longest(~filled_samples(record))
+
+
+def _longest(kept: Mask) -> slice:
+    """The longest run of a mask; all where it has none."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]])))
     runs = edges.reshape(-1, 2)
     return slice(*runs[np.argmax(np.diff(runs, axis=1))].tolist()) if len(runs) else slice(None)
 

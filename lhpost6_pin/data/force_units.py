@@ -35,7 +35,7 @@ from .rests import rest_numbers
 __all__ = ["wrong_forces"]
 
 TURNED = -1.0
-SIGN_REMEDY = "its sign is turned: write sign = -1 in the channel map, and import again"
+SIGN_REMEDY = "its sign is turned: write sign = -1 in the channel map, or remove it where it stands, and import again"
 ALIKE = 1e-3  # of a logarithm: kN taken for N, and kip taken for lbf, are the same factor
 MOST_ENUMERATED = 10  # actuators of which all sets are tried; of more, singles, pairs, kinds, and kinds but for one
 

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from ..core.arrays import Mask
+from .filled_samples import between_gaps
 
 __all__ = ["ANSWERED", "PLANT_STATE", "SAFE_HOLD", "before_trip", "judged_samples", "served_findings", "trip_note"]
 
@@ -30,9 +31,13 @@ _TRIP = re.compile(r"tripped (?:at (?P<time>[\d.]+) s|before the recording began
 def before_trip(record: xr.Dataset) -> xr.Dataset:
     """The record up to its trip, with its time and reason as attribute `cut`; as it is where there is none.
 
-    Of one that tripped before it began the first two samples are left, which are too short for all. The cut is logged
-    as a warning with the test's name.
+    Of one that tripped before it began the first two samples are left, which are too short for all; of one with long
+    gaps the longest stretch between them (`between_gaps`). Cuts are logged as warnings with the test's name.
     """
+    return between_gaps(_up_to_trip(record))
+
+
+def _up_to_trip(record: xr.Dataset) -> xr.Dataset:
     trouble = str(record.attrs.get("trouble", "none"))
     trip = _TRIP.match(trouble)
     if trip is None or "time" not in record:
@@ -49,9 +54,9 @@ def before_trip(record: xr.Dataset) -> xr.Dataset:
 
 
 def trip_note(record: xr.Dataset) -> tuple[str, ...]:
-    """When and why a record was cut by `before_trip`, as a note; none where it was not."""
-    cut = str(record.attrs.get("cut", ""))
-    return (cut,) if _TRIP.match(cut) else ()
+    """When and why a record was cut by `before_trip`, as notes; none where it was not."""
+    cut, gap = (str(record.attrs.get(name, "")) for name in ("cut", "gap"))
+    return (*((cut,) if _TRIP.match(cut) else ()), *((gap,) if gap else ()))
 
 
 def judged_samples(dataset: xr.Dataset) -> Mask:

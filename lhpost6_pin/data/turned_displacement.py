@@ -25,7 +25,7 @@ from .turned_signs import turned_signs
 __all__ = ["turned_displacement"]
 
 _DISPLACEMENT, _LENGTHS = MOTION[0], "actuator_displacement"
-_REMEDY = "write sign = -1 in the channel map, and import again"
+_REMEDY = "write sign = -1 in the channel map, or remove it where it stands, and import again"
 
 _Verdict = tuple[bool, str]  # whether a witness agrees with the displacement, and its channels
 

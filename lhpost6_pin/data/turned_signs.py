@@ -19,7 +19,7 @@ from .rests import rest_numbers
 
 __all__ = ["turned_signs"]
 
-_REMEDY = "its sign is turned: write sign = -1 in the channel map, and import again"
+_REMEDY = "its sign is turned: write sign = -1 in the channel map, or remove it where it stands, and import again"
 _EITHER = (
     "its sign is turned, or it is exchanged with {}: write sign = -1 in the channel map, or exchange both there, "
     "and import again"

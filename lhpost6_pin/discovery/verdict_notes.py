@@ -43,6 +43,9 @@ FALLS = 2.0
 MOVES = 0.05
 """Share by which effects lower the error of a balance at least where it is evidence for them: scatter is less."""
 
+CLOSED = 0.5
+"""Share of a gap beyond its floor from which its closing is evidence for the effects."""
+
 LISTED = 3  # sensor errors that are named
 
 
@@ -72,15 +75,16 @@ def floor_note(found: "Discovery") -> str:
     hidden = [f"{gap.phase}, {gap.test}" for gap in gaps if math.isnan(gap.closure)]
     if not hidden:
         return ""
-    shown = any(b.error[1] - b.error[2] > MOVES * b.error[1] for b in found.balances)
-    evidence = (
-        "the balances are the evidence"
-        if shown
-        else "nor do their balances show it: evidence is in the tests of the search alone, of which one may be held out"
-    )
+    if any(b.error[1] - b.error[2] > MOVES * b.error[1] for b in found.balances):
+        evidence = "and the balances are the evidence"
+    elif any(gap.closure > CLOSED for gap in _open_gaps(found)):
+        evidence = "and the other phases are the evidence"
+    else:
+        alone = "evidence is in the tests of the search alone, of which one may be held out"
+        evidence = f"nor do their balances show it: {alone}"
     return (
         f"At the floor without effects already: {'; '.join(hidden)}. Sensor noise, also that in the state of friction, "
-        f"hides there what the effects do: no closure is stated, {'and ' * shown}{evidence}."
+        f"hides there what the effects do: no closure is stated, {evidence}."
     )
 
 

@@ -28,6 +28,8 @@ from .raw import RawTest, shown
 __all__ = ["Guess", "guess_map", "is_export", "other_columns"]
 
 _PLACEHOLDER = "CHANNEL"
+_FURTHER = ("reference_velocity", "reference_acceleration", "supply_flow")
+"""Columns of an export of which a record has no channel: variables that a simulation adds."""
 _FLOORS, _SHARE = "floor_acceleration", "valve_command"
 _FEW_SENSORS = ("pressure_difference", _SHARE, _FLOORS)
 """Kinds of channels that a remark names even where a record of the machine does not have them."""
@@ -110,6 +112,10 @@ def guess_map(
             zero = Source(constant=0.0, unit=channel_unit(name))
             remarks.append(f"{source_line(name, zero)}  # not found; if it is known to be zero")
     free = [n for n, (_, label) in machine.known.items() if n not in found and not _is_still(label, machine)]
+    further = [source for source, _ in unknown if str(source.column).startswith(_FURTHER)]
+    unknown = [(source, why) for source, why in unknown if source not in further]
+    if further:
+        remarks.append(f"{shown([str(s.column) for s in further])}: further variables of an export, which need no line")
     remarks += [f"{source_line(_PLACEHOLDER, source)}  # {why}{_possible(source, free)}" for source, why in unknown]
     if unknown:
         remarks.append(f"{_PLACEHOLDER} is one of: {_short(free)}")

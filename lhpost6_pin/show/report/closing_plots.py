@@ -8,7 +8,7 @@ from ...core.names import AXES
 from ...discovery import Discovery
 from ...discovery.effect_loops import EffectLoop
 from ...discovery.held_out import GapTraces
-from ...discovery.verdict_file import title_of
+from ...discovery.verdict_file import title_of, where
 from ...identification.validation import PHASES
 from .charts import Curve, Plot, grid_figure
 from .page import Block, Figure, Table, number
@@ -103,13 +103,16 @@ def _share_table(found: Discovery) -> Table:
     """Share of the squared error that each effect explains in its own column and in every phase, and all of them."""
     rows = [(title_of(o.family), f"{o.column}, {o.test}", _percent(o.explained)) for o in found.loops]
     titles = {one.candidate.name: title_of(one.candidate.family.named) for one in found.search.added}
+    if len({*titles.values()}) < len(titles):  # two of a family are told apart by their components
+        each = {one.candidate.name: where(one.candidate.components) for one in found.search.added}
+        titles = {name: f"{title} ({each[name]})" for name, title in titles.items()}
     every = next(iter(titles.values())) if len(titles) == 1 else "all effects"
     for gap in found.proof.gaps if found.proof else ():
-        where = f"{gap.phase}, {gap.test}"
+        place = f"{gap.phase}, {gap.test}"
         if len(titles) > 1:
-            rows += [(titles[name], where, _percent(own)) for name, own in gap.shares.items()]
+            rows += [(titles[name], place, _percent(own)) for name, own in gap.shares.items()]
         share = 1.0 - gap.after**2 / gap.refitted**2 if gap.refitted > 0.0 else 0.0
-        rows.append((every, where, f"{_percent(share)} ({number(gap.refitted)} before)"))
+        rows.append((every, place, f"{_percent(share)} ({number(gap.refitted)} before)"))
     return Table(
         "Share of the squared error explained: by an effect against the model without it, by all against the refit",
         ("Effect", "Of", "Share"),

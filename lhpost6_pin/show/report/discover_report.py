@@ -201,7 +201,9 @@ def _acted_on(found: Discovery) -> set[str]:
 
 def _headlines(found: Discovery) -> list[Headline]:
     verdict = found.verdict
-    named = ", ".join(title_of(one.family) for one in verdict.effects) or "none"
+    titles = [title_of(one.family) for one in verdict.effects]
+    each = zip(titles, verdict.effects, strict=True)  # two of a family are told apart by their components
+    named = ", ".join(f"{t} ({where(e.components)})" if titles.count(t) > 1 else t for t, e in each) or "none"
     words, _, left = _verdict_of(found)[0].partition(", ")
     shown = [Headline(words, "Verdict", left)]
     if verdict.word == "sensor":

@@ -185,6 +185,16 @@ def fly(drive: Drive, orders: dict[int, object], blocks: int) -> list[np.ndarray
 
 
 @pytest.mark.fast
+def test_the_scale_of_a_motion_is_not_that_of_a_wave_after_it():
+    """Recordings of sines at their full spans stated the scale 0.5 of an earthquake before them."""
+    drive = Drive(NUMBERS, np.full(6, 1.0), np.zeros(6))
+    drive.load(recorded(30.0), 0.5)
+    assert drive.scale == 0.5
+    drive.load(make_wave("sine", axes=(0,), frequency=0.7, **GENERATOR))
+    assert drive.scale == 1.0
+
+
+@pytest.mark.fast
 @pytest.mark.parametrize("kind", ["wave", "motion"])
 def test_the_reference_is_smooth_through_run_hold_span_setpoint_and_stop(kind):
     drive = Drive(NUMBERS, np.full(6, 1.0), np.zeros(6))

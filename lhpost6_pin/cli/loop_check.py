@@ -67,9 +67,12 @@ def loop_entries(attrs: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def retuned(
-    table: "Machine", settings: "ControllerSettings | UserController", folder: Path
+    table: "Machine", settings: "ControllerSettings | UserController", folder: Path, *, report: bool = True
 ) -> tuple["ControllerSettings", "Tuning", list[Path]]:
-    """Settings tuned for a table with its specimen; writes controller.toml and tuning.html; says the time it took."""
+    """Settings tuned for a table with its specimen; writes controller.toml and, with `report`, tuning.html.
+
+    Says the time it took.
+    """
     from dataclasses import replace
 
     from ..control import ControllerSettings, save_controller
@@ -84,9 +87,10 @@ def retuned(
         found = tune(table, settings, progress=progress)
     log.warning("tuned for %s, %s, in %.0f s", table.name, load, time.perf_counter() - start)
     tuned = replace(found.after, name=f"tuned for {table.name}, {load}")
-    files = [folder / name for name in TUNING_FILES]
+    files = [folder / name for name in TUNING_FILES[: 1 + report]]
     save_controller(tuned, files[0], f"lhpost6 run --retune on {table.name}, {load}")
-    write_tune_report(found, files[1], command=repeating_command())
+    if report:
+        write_tune_report(found, files[1], command=repeating_command())
     return tuned, found, files
 
 

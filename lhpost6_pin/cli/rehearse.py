@@ -86,14 +86,15 @@ def run(
     target = motion.target(table, beyond)
     name = target.reference.motion.replace("/", "_")
     leave_out = {file for file, no in (("record.nc", no_record), ("report.html", no_report)) if no}
-    written = [*(file for file in RUN_FILES if file not in leave_out), *(TUNING_FILES if retune else ())]
+    tuning = TUNING_FILES[: 2 - no_report] if retune else ()
+    written = [*(file for file in RUN_FILES if file not in leave_out), *tuning]
     folder = opt.folder_for(out, name, *written, inputs=motion.files)
     given = chosen
     more: list[Path] = []
     if retune:
         if inverse is not None:
             raise SimulationError("--aic is an inverse of the controller as it was; --retune changes it")
-        chosen, _, more = retuned(table, chosen, folder)
+        chosen, _, more = retuned(table, chosen, folder, report=not no_report)
     loop = checked_loop(table, chosen, machine, retune=not retune)
     title = f"{target.reference.title} on {table.name}"
     wait_for(compiling)

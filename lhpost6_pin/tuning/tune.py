@@ -43,6 +43,7 @@ from .margins import (
     margins,
     without_dry_friction,
 )
+from .stability import check_loop
 
 __all__ = ["AxisTuning", "Tuning", "TuningStep", "stays_stable", "tune"]
 
@@ -217,7 +218,8 @@ class _Job:
 def stays_stable(machine: Machine, settings: ControllerSettings, seconds: float = 6.0) -> bool:
     """Whether the response to a short burst of noise on all axes decays in a simulation without dry friction.
 
-    Over the last thirds of the `seconds` after it every axis must decay, or be at rest; a limit cycle does neither.
+    Over the last thirds of the `seconds` after it every axis must decay, or be at rest; a limit cycle does neither. Of
+    what is nearly at rest the linear model decides.
     """
     plant, rest, controller = controlled(without_dry_friction(machine), settings)
     target = noise_target([AXES[k] for k in plant.axes], machine.limits, duration=5.0)
@@ -231,7 +233,10 @@ def stays_stable(machine: Machine, settings: ControllerSettings, seconds: float 
     speed = run.v[:, : plant.axes.size]
     moved, early, late = (np.sqrt(np.mean(part**2, axis=0)) for part in (speed, speed[-2 * n : -n], speed[-n:]))
     fading, still = late < 0.9 * early, (late < 0.01 * moved) & (late < early)  # a reset integrator fades slowly
-    return bool(np.all(fading | still | (late < 1e-6 * moved)))
+    if np.all(fading | still | (late < 1e-6 * moved)):
+        return True
+    # a thousandth that is left may be a slow mode that swings past the ends of both thirds: the linear model decides
+    return bool(np.all(fading | (late < 1e-3 * moved))) and check_loop(controller).stable
 
 
 def _tune_feedback(job: _Job, settings: ControllerSettings) -> ControllerSettings:

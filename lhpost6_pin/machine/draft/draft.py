@@ -49,7 +49,11 @@ def draft_machine(
     area_a, area_b = first(areas[0].value), first(areas[1].value)
     high, low = first(oil["supply_pressure"].value), first(oil["return_pressure"].value)
     if low >= high:
-        raise ParameterError("--return-pressure is not below --supply-pressure")
+        assumed = "" if "return_pressure" in known else ", assumed"
+        raise ParameterError(
+            f"--supply-pressure is {high:g} Pa, not above the return pressure of {low:g} Pa{assumed}; correct its "
+            "unit, or give --return-pressure"
+        )
     drive = cylinder_numbers(basis, areas, area_a * (high - low), motion != "free")
     valve, speed = _valve(basis, (area_a, area_b), (high, low))
     legs = _legs(basis, motion, vector(platen["size"]), -vector(platen["bearing_plane"])[2])

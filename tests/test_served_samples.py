@@ -7,7 +7,7 @@ import xarray as xr
 from lhpost6_pin.data.campaign import Campaign
 from lhpost6_pin.data.check import check_dataset
 from lhpost6_pin.data.records import make_record
-from lhpost6_pin.data.served_samples import SAFE_HOLD, before_trip, trip_note
+from lhpost6_pin.data.served_samples import SAFE_HOLD, cut_notes, part_compared
 from lhpost6_pin.identification.calibration import usable_tests
 from lhpost6_pin.interfaces.link import PlantState
 from lhpost6_pin.machine.machine import load_machine
@@ -79,11 +79,11 @@ def test_a_recording_is_used_up_to_its_trip_once(trouble, count, caplog):
     """At 2048 Hz sample 3000 is at 1.46484 s, the last before the trip."""
     record = recorded(trouble=trouble)
     record.encoding["source"] = "panel.nc"
-    part = before_trip(record)
+    part = part_compared(record)
     assert part.sizes["time"] == (2 * RATE if count is None else count) and part.encoding["source"] == "panel.nc"
-    assert bool(trip_note(part)) == (count is not None) == ("test panel tripped" in caplog.text)
-    assert before_trip(part).identical(part)
-    assert not trip_note(record.assign_attrs(cut="ends in motion")) and before_trip(recorded()).identical(recorded())
+    assert bool(cut_notes(part)) == (count is not None) == ("test panel tripped" in caplog.text)
+    assert part_compared(part).identical(part)
+    assert not cut_notes(record.assign_attrs(cut="ends in motion")) and part_compared(recorded()).identical(recorded())
 
 
 def test_a_test_that_tripped_is_calibrated_up_to_its_trip_or_skipped(caplog):

@@ -14,7 +14,7 @@ import xarray as xr
 from ..core.arrays import Mask
 from .filled_samples import between_gaps
 
-__all__ = ["ANSWERED", "PLANT_STATE", "SAFE_HOLD", "before_trip", "judged_samples", "served_findings", "trip_note"]
+__all__ = ["ANSWERED", "PLANT_STATE", "SAFE_HOLD", "cut_notes", "judged_samples", "part_compared", "served_findings"]
 
 log = logging.getLogger(__name__)
 
@@ -28,8 +28,8 @@ _TRIP = re.compile(r"tripped (?:at (?P<time>[\d.]+) s|before the recording began
 """Beginning of the attribute `trouble` of a recording that tripped; its time is that of the record."""
 
 
-def before_trip(record: xr.Dataset) -> xr.Dataset:
-    """The record up to its trip, with its time and reason as attribute `cut`; as it is where there is none.
+def part_compared(record: xr.Dataset) -> xr.Dataset:
+    """The part of a record that is compared: up to its trip, with its time and reason as attribute `cut`, else all.
 
     Of one that tripped before it began the first two samples are left, which are too short for all; of one with long
     gaps the longest stretch between them (`between_gaps`). Cuts are logged as warnings with the test's name.
@@ -53,8 +53,8 @@ def _up_to_trip(record: xr.Dataset) -> xr.Dataset:
     return part
 
 
-def trip_note(record: xr.Dataset) -> tuple[str, ...]:
-    """When and why a record was cut by `before_trip`, as notes; none where it was not."""
+def cut_notes(record: xr.Dataset) -> tuple[str, ...]:
+    """When and why a record was cut by `part_compared`, as notes; none where it was not."""
     cut, gap = (str(record.attrs.get(name, "")) for name in ("cut", "gap"))
     return (*((cut,) if _TRIP.match(cut) else ()), *((gap,) if gap else ()))
 

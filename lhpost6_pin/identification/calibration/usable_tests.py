@@ -15,7 +15,7 @@ from ...data.campaign import Campaign, SkippedTest
 from ...data.channels import calibrated_channels, columns_of
 from ...data.conditioning import resolutions
 from ...data.records import is_measured
-from ...data.served_samples import before_trip
+from ...data.served_samples import part_compared
 from .result import calibration_numbers
 from .whitened_residuals import spectrum_of
 
@@ -33,9 +33,9 @@ _ALIVE = 100.0
 def usable_tests(campaign: Campaign) -> Campaign:
     """The campaign without the tests that cannot be compared, which join its `skipped`; each is logged as a warning.
 
-    Those that tripped are cut there (`before_trip`). Raises RecordError with the first reason if none is left.
+    Those that tripped are cut there (`part_compared`). Raises RecordError with the first reason if none is left.
     """
-    campaign, numbers = campaign._replace(records=tuple(map(before_trip, campaign.records))), calibration_numbers()
+    campaign, numbers = campaign._replace(records=tuple(map(part_compared, campaign.records))), calibration_numbers()
     bands, edge = numbers.vector("comparison.bands"), numbers.number("comparison.edge")
     why = [too_short(record, bands, edge) for record in campaign.records]
     long = [record for record, reason in zip(campaign.records, why, strict=True) if not reason]

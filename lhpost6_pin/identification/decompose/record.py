@@ -21,7 +21,7 @@ from ...data.channels import MOTION
 from ...data.measured_sensors import find_sensors
 from ...data.records import is_measured, require, sample_interval
 from ...data.sensors import SensorSet
-from ...data.served_samples import before_trip, trip_note
+from ...data.served_samples import cut_notes, part_compared
 from ...data.signals import Band
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters, load_parameters
@@ -120,7 +120,7 @@ def decompose_record(
     `specimen` of the ledger. Raises RecordError for a record that lacks channels, is not finite, of another machine or
     specimen, out of stroke or too short.
     """
-    record = before_trip(record)
+    record = part_compared(record)
     machine = machine.as_mounted(record.attrs, source_of(record))
     check_usable(machine, record)
     numbers, dt, mounted = decompose_numbers(), sample_interval(record), make_plant(machine)
@@ -153,7 +153,7 @@ def decompose_record(
         raise RecordError(
             f"{source_of(record)}: {n * test.dt:.3g} s are too short; {comparison.edge:g} s at each end are cut off"
         )
-    notes, inside = (*trip_note(record), *notes), slice(cut, n - cut)
+    notes, inside = (*cut_notes(record), *notes), slice(cut, n - cut)
     forces, motion = _filtered(whole, test.motion, band, test.dt, inside)
     return Decomposed(test, sensors, comparison, whole, forces, motion, inside, delays, notes, mounted)
 

@@ -26,7 +26,7 @@ from ...data.alignment import Delay, align_record
 from ...data.campaign import Campaign
 from ...data.measured_sensors import find_sensors
 from ...data.sensors import SensorSet
-from ...data.served_samples import before_trip, trip_note
+from ...data.served_samples import cut_notes, part_compared
 from ...machine.machine import Machine
 from ...mechanics.linearize import oil_column_modes
 from ...mechanics.plant import make_plant
@@ -93,7 +93,7 @@ def validate(
     two tests have one name. A recording that tripped is compared up to its trip, with a note.
     """
     _check_names(campaign)
-    campaign = campaign._replace(records=tuple(map(before_trip, campaign.records)))
+    campaign = campaign._replace(records=tuple(map(part_compared, campaign.records)))
     sensors, numbers = sensors or find_sensors(machine, campaign.records), validation_numbers()
     plant = make_plant(machine)
     enough = [record for record in campaign.records if _seconds(record) >= numbers.shortest]
@@ -149,7 +149,7 @@ def _phases_of(
     except LhpostError as error:
         name, time = str(record.attrs.get("test", "test")), record["time"].values
         test, why = None, str(error)
-    trip = trip_note(record)
+    trip = cut_notes(record)
     for number in phases:
         phase = Phase(number, name, time, reason=why) if test is None else run_phase(number, test)
         found.append(replace(phase, notes=(*trip, *phase.notes)))

@@ -201,9 +201,8 @@ def _acted_on(found: Discovery) -> set[str]:
 
 def _headlines(found: Discovery) -> list[Headline]:
     verdict = found.verdict
-    titles = [title_of(one.family) for one in verdict.effects]
-    each = zip(titles, verdict.effects, strict=True)  # two of a family are told apart by their components
-    named = ", ".join(f"{t} ({where(e.components)})" if titles.count(t) > 1 else t for t, e in each) or "none"
+    families = [one.family for one in verdict.effects]  # two of one are told apart by their components
+    named = [title_of(e.family) + f" ({where(e.components)})" * (families.count(e.family) > 1) for e in verdict.effects]
     words, _, left = _verdict_of(found)[0].partition(", ")
     shown = [Headline(words, "Verdict", left)]
     if verdict.word == "sensor":
@@ -211,7 +210,7 @@ def _headlines(found: Discovery) -> list[Headline]:
         size = f"{first.estimate.value:.4g} {first.estimate.unit}"
         shown.append(Headline(first.name, "Sensor", f"{size}; sensors file: at most {first.stated:.3g}"))
     else:
-        shown.append(Headline(named, "Effects"))
+        shown.append(Headline(", ".join(named) or "none", "Effects"))
     if errors := held_out_errors(found):
         (widest, unit), (_, refitted, after) = max(errors.items(), key=lambda one: one[1][1])
         shown.append(

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -183,9 +183,12 @@ def sine(
     with progress_bar(f"sine in {axis} on {table.name}") as progress:
         found = sine_test(table, settings, axis=axis, amplitude=size, frequency=frequency, progress=progress)
     report = write_sine_report(found, folder / "report.html", command=repeating_command(), loop=loop)
-    words, level = sine_verdict(found, loop)
-    entries = {"verdict": words, "level": level} | sine_entries(found) | loop_entries(loop)
-    print_result(json, lambda: entries, lambda: print_sine(found, loop), [report])
+
+    def entries() -> dict[str, Any]:
+        words, level = sine_verdict(found, loop)
+        return {"verdict": words, "level": level, **sine_entries(found), **loop_entries(loop)}
+
+    print_result(json, entries, lambda: print_sine(found, loop), [report])
 
 
 def _amplitude(text: str, axis: str) -> float:

@@ -3,7 +3,7 @@
 import logging
 import shlex
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -67,9 +67,9 @@ def loop_entries(attrs: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def retuned(
-    table: "Machine", settings: "ControllerSettings | UserController", folder: Path, *, report: bool = True
+    table: "Machine", settings: "ControllerSettings | UserController", folder: Path, leave_out: Collection[str] = ()
 ) -> tuple["ControllerSettings", "Tuning", list[Path]]:
-    """Settings tuned for a table with its specimen; writes controller.toml and, with `report`, tuning.html.
+    """Settings tuned for a table with its specimen; writes those of `TUNING_FILES` that are not left out.
 
     Says the time it took.
     """
@@ -87,11 +87,12 @@ def retuned(
         found = tune(table, settings, progress=progress)
     log.warning("tuned for %s, %s, in %.0f s", table.name, load, time.perf_counter() - start)
     tuned = replace(found.after, name=f"tuned for {table.name}, {load}")
-    files = [folder / name for name in TUNING_FILES[: 1 + report]]
-    save_controller(tuned, files[0], f"lhpost6 run --retune on {table.name}, {load}")
-    if report:
-        write_tune_report(found, files[1], command=repeating_command())
-    return tuned, found, files
+    settings_file, report = (folder / name for name in TUNING_FILES)
+    save_controller(tuned, settings_file, f"lhpost6 run --retune on {table.name}, {load}")
+    if report.name in leave_out:
+        return tuned, found, [settings_file]
+    write_tune_report(found, report, command=repeating_command())
+    return tuned, found, [settings_file, report]
 
 
 def interaction_of(

@@ -85,16 +85,16 @@ def run(
         check_circumstances(str(aic), inverse.made_with, table, chosen.name)
     target = motion.target(table, beyond)
     name = target.reference.motion.replace("/", "_")
-    leave_out = {file for file, no in (("record.nc", no_record), ("report.html", no_report)) if no}
-    tuning = TUNING_FILES[: 2 - no_report] if retune else ()
-    written = [*(file for file in RUN_FILES if file not in leave_out), *tuning]
+    asked = (("record.nc", no_record), ("report.html", no_report), ("tuning.html", no_report))
+    leave_out = {file for file, no in asked if no}
+    written = [file for file in (*RUN_FILES, *(TUNING_FILES if retune else ())) if file not in leave_out]
     folder = opt.folder_for(out, name, *written, inputs=motion.files)
     given = chosen
     more: list[Path] = []
     if retune:
         if inverse is not None:
             raise SimulationError("--aic is an inverse of the controller as it was; --retune changes it")
-        chosen, _, more = retuned(table, chosen, folder, report=not no_report)
+        chosen, _, more = retuned(table, chosen, folder, leave_out)
     loop = checked_loop(table, chosen, machine, retune=not retune)
     title = f"{target.reference.title} on {table.name}"
     wait_for(compiling)

@@ -28,8 +28,7 @@ FILLED = "filled_samples"
 
 def stated_runs(filled: Mask) -> str:
     """Runs of a mask (n,) as `FILLED` states them."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], filled, [False]])))
-    return ", ".join(f"{b - a} from {a}" for a, b in edges.reshape(-1, 2).tolist())
+    return ", ".join(f"{last - first} from {first}" for first, last in _runs(filled))
 
 
 def filled_samples(record: xr.Dataset) -> Mask:
@@ -49,14 +48,12 @@ def between_gaps(record: xr.Dataset) -> xr.Dataset:
     if not filled.any():
         return record
     time = record["time"].values
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], filled, [False]]))).reshape(-1, 2)
     most = LONGEST_FILLED * (len(time) - 1) / (time[-1] - time[0])
-    long = [(first, last) for first, last in edges.tolist() if last - first > most]
-    if not long:
-        return record
     gap = np.zeros(len(time), bool)
-    for first, last in long:
-        gap[first:last] = True
+    for first, last in _runs(filled):
+        gap[first:last] = last - first > most
+    if not gap.any():
+        return record
     part = _longest(~gap)
     lost = f"{int(gap.sum())} samples are interpolated, in gaps of more than {LONGEST_FILLED:g} s"
     kept = f"{lost}: only {time[part][0]:.5g} to {time[part][-1]:.5g} s, the longest stretch between them, are used"
@@ -73,9 +70,13 @@ def longest_measured(record: xr.Dataset) -> slice:
 
 def _longest(kept: Mask) -> slice:
     """The longest run of a mask; all where it has none."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]])))
-    runs = edges.reshape(-1, 2)
-    return slice(*runs[np.argmax(np.diff(runs, axis=1))].tolist()) if len(runs) else slice(None)
+    return slice(*max(_runs(kept), key=lambda run: run[1] - run[0], default=(None, None)))
+
+
+def _runs(mask: Mask) -> list[tuple[int, int]]:
+    """Runs (first, one past the last) of a mask (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
+    return [(first, last) for first, last in edges.reshape(-1, 2).tolist()]
 
 
 def stated_constants(record: xr.Dataset) -> frozenset[str]:

@@ -31,11 +31,11 @@ from .channels import columns_of
 from .force_balance import ForceBalance, actuator_groups, dynamic_balances, static_balance
 from .layout_faults import RecordFinding
 from .rests import rest_numbers
+from .turned_signs import SIGN_REMEDY
 
 __all__ = ["wrong_forces"]
 
 TURNED = -1.0
-SIGN_REMEDY = "its sign is turned: write sign = -1 in the channel map, or remove it where it stands, and import again"
 ALIKE = 1e-3  # of a logarithm: kN taken for N, and kip taken for lbf, are the same factor
 MOST_ENUMERATED = 10  # actuators of which all sets are tried; of more, singles, pairs, kinds, and kinds but for one
 

@@ -20,12 +20,11 @@ from .channels import MOTION
 from .layout_faults import RecordFinding
 from .motion_pairs import motion_gains
 from .rests import rest_numbers
-from .turned_signs import turned_signs
+from .turned_signs import TURN_IT, turned_signs
 
 __all__ = ["turned_displacement"]
 
 _DISPLACEMENT, _LENGTHS = MOTION[0], "actuator_displacement"
-_REMEDY = "write sign = -1 in the channel map, or remove it where it stands, and import again"
 
 _Verdict = tuple[bool, str]  # whether a witness agrees with the displacement, and its channels
 
@@ -51,7 +50,7 @@ def turned_displacement(record: xr.Dataset, machine: Machine | None) -> tuple[li
         if len(heard[k]) >= least and not any(agrees for agrees, _ in heard[k])
     }
     findings = [
-        RecordFinding("error", f"{_DISPLACEMENT}[{AXES[k]}]", None, f"is turned against {', '.join(names)}", _REMEDY)
+        RecordFinding("error", f"{_DISPLACEMENT}[{AXES[k]}]", None, f"is turned against {', '.join(names)}", TURN_IT)
         for k, names in turned.items()
     ]
     return findings, _turned_back(record, turned)

@@ -17,9 +17,11 @@ from .layout_faults import RecordFinding
 from .mass_regression import MassFit, mass_fits
 from .rests import rest_numbers
 
-__all__ = ["turned_signs"]
+__all__ = ["SIGN_REMEDY", "TURN_IT", "turned_signs"]
 
-_REMEDY = "its sign is turned: write sign = -1 in the channel map, or remove it where it stands, and import again"
+TURN_IT = "write sign = -1 in the channel map, or remove it where it stands, and import again"
+SIGN_REMEDY = f"its sign is turned: {TURN_IT}"
+"""Remedies of a turned channel: of one that is known to be, and of one that the message calls so."""
 _EITHER = (
     "its sign is turned, or it is exchanged with {}: write sign = -1 in the channel map, or exchange both there, "
     "and import again"
@@ -53,4 +55,4 @@ def _remedy(fit: MassFit, turned: Set[str]) -> str:
     """What to do about a turned force; all channels that are turned."""
     name = fit.channel.partition("[")[0]
     others = [other for other in fit.opposite if f"{name}[{other}]" in turned]
-    return _EITHER.format(" or ".join(others)) if others else _REMEDY
+    return _EITHER.format(" or ".join(others)) if others else SIGN_REMEDY

@@ -182,8 +182,10 @@ def find_delays(plant: Plant, records: Sequence[xr.Dataset], policy: Policy) -> 
 
 def warn_of_skews(delays: Mapping[str, Delay], sensors: SensorSet | None) -> None:
     """Log a warning of every delay that is beyond what the stated ranges of both groups allow."""
-    for group, one in delays.items() if sensors else ():
-        most = sensors.relative_delay_range(group, one.reference) if sensors else 0.0
+    if sensors is None:
+        return
+    for group, one in delays.items():
+        most = sensors.relative_delay_range(group, one.reference)
         if abs(one.delay) - SIGNIFICANT.significance * one.standard_error > most:
             where = "behind" if one.delay > 0.0 else "ahead of"
             log.warning(

@@ -96,9 +96,8 @@ class Drive:
     def load(self, program: Program | None, scale: float | None = None) -> None:
         """Take a program in place of another, which must be stopped, at a scale if it has one; None: no program."""
         self.program, self._clock, self._stopping = program, 0.0, False
-        if program is not None and program.by_span:
-            self.scale = 1.0  # that of a motion before is not its own
-        self.scale = self.scale if scale is None else scale
+        before = 1.0 if program is not None and program.by_span else self.scale  # a motion's is not that of a wave
+        self.scale = before if scale is None else scale
         self._rate = at_rest(np.zeros(1))
         if program is None:
             return

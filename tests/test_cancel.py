@@ -15,7 +15,7 @@ from lhpost6_pin.motions import find_motion, make_target
 from lhpost6_pin.simulation.simulate import ClosedLoop, PluggedLoop
 from lhpost6_pin.tuning import cancel as module
 from lhpost6_pin.tuning import identify as identify_module
-from lhpost6_pin.tuning.cancel import amplitude_at, cancelling
+from lhpost6_pin.tuning.cancel import amplitude_at, cancelling, change_of_cycles
 from lhpost6_pin.tuning.sine import sine_target
 
 pytestmark = pytest.mark.long
@@ -64,6 +64,15 @@ def test_of_a_motion_that_is_no_sine_a_warning_says_how_little_there_is_to_cance
     slow = 0.3 * np.sin(2.0 * np.pi * 0.1 * np.arange(len(x)) / 2048.0)
     cancelling(closed, replace(target, displacement=target.displacement + np.outer(slow, np.eye(6)[0])), "x=1")
     assert "of its largest displacement in x" in caplog.text
+    assert change_of_cycles(np.sin(2.0 * np.pi * np.arange(20480) / 2048.0), 1.0) < 1e-9  # a steady sine
+
+
+def test_an_earthquake_with_much_of_that_frequency_is_no_sine(loop, caplog):
+    closed, _ = loop
+    target = make_target(find_motion("ridgecrest"))
+    drive = closed.controller.drive_for(target.displacement, target.velocity, target.acceleration)
+    cancelling(closed._replace(drive=drive), target, "x=0.3")  # 81 % of its largest displacement
+    assert "does not repeat itself at 0.3 Hz" in caplog.text
 
 
 @pytest.mark.parametrize(

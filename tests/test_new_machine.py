@@ -372,6 +372,13 @@ def test_templates_are_no_machines():
         load_machine("new_machine")
 
 
+def test_a_file_of_ones_own_is_proposed_where_its_ending_is_missing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.toml").touch()
+    with pytest.raises(Exception, match=r"did you mean 'small\.toml'"):
+        load_machine("small")
+
+
 def test_limits_of_a_draft_are_printed_with_their_units(capsys, tmp_path):
     print_draft(machine_named("uniaxial"), tmp_path / "m.toml")
     assert "x 0.15 m 0.4 m/s 20 m/s2" in " ".join(re.sub("[^!-~]", " ", capsys.readouterr().out).split())

@@ -357,8 +357,11 @@ def test_a_page_in_a_browser_drives_the_table(panel, tmp_path):
             assert await tab.evaluate("document.getElementById('platen-state').textContent") == "parked"
         await press(tab, "raise")
         await wait(tab, reads("platen-state", "raised"))
+        await tab.evaluate("document.getElementById('span-x').focus()")
         await enter(tab, "span-x", "05")  # what is left of a decimal comma
         await wait(tab, reads("refusal", "enter one in mm, with a decimal point"))
+        await wait(tab, "document.getElementById('span-x').value === '0'", "the span as it was")
+        assert await tab.evaluate("getSelection().toString()") == "0"  # what is typed next replaces it
         await enter(tab, "span-x", "100")
         await wait(tab, reads("log", "sets the span of x to 100 mm"))
         await enter(tab, "interlock-displacement", "50")

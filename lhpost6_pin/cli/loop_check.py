@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import ParameterError
-from .app import progress_bar, repeating_command
+from .app import progress_bar, repeating_command, stderr
 from .options import SpecimenOptions
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def retuned(
     start = time.perf_counter()
     with progress_bar(f"tuning for {table.name}, {load}") as progress:
         found = tune(table, settings, progress=progress)
-    log.warning("tuned for %s, %s, in %.0f s", table.name, load, time.perf_counter() - start)
+    stderr().print(f"tuned for {table.name}, {load}, in {time.perf_counter() - start:.0f} s", markup=False)
     tuned = replace(found.after, name=f"tuned for {table.name}, {load}")
     settings_file, report = (folder / name for name in TUNING_FILES)
     save_controller(tuned, settings_file, f"lhpost6 run --retune on {table.name}, {load}")

@@ -50,10 +50,15 @@ def shipped_specimens() -> dict[str, Path]:
 
 
 def find_shipped(kind: str, name: str, folder: str = "", suffix: str = ".toml") -> Path:
-    """File of the shipped data by name; raises UnknownNameError, in which `kind` names the kind of file."""
+    """File of the shipped data by name.
+
+    Raises UnknownNameError, in which `kind` names the kind of file; it proposes also a file of the user's with that
+    stem.
+    """
     known = shipped(folder, suffix)
     if name not in known:
-        raise UnknownNameError(kind, name, list(known))
+        own = f"{name}{suffix}"
+        raise UnknownNameError(kind, name, [*known, *([own] if Path(own).is_file() else [])])
     return known[name]
 
 

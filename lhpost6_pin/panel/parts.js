@@ -53,7 +53,10 @@ export function follow(input, onChange) { // an input that shows the state, but 
 export function show(input, value) {
   if (input.dataset.typed || performance.now() < Number(input.dataset.held ?? 0)) return;
   if (input.type === "checkbox") { if (input.checked !== value) input.checked = value; }
-  else if (input.value !== value) input.value = value;
+  else if (input.value !== value) {
+    input.value = value;
+    if (document.activeElement === input) input.select?.(); // what is typed next replaces it, as in a field just entered
+  }
 }
 export function typedNumber(input) { // "05" is what some browsers leave of "0,5"
   return /^-?0\d/.test(input.value) ? NaN : input.valueAsNumber;

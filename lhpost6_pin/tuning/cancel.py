@@ -20,11 +20,12 @@ from ..simulation.simulate import ClosedLoop, PluggedLoop
 from .identify import section, tuning_numbers
 from .sine import axis_row, with_cancellers
 
-__all__ = ["amplitude_at", "cancelling"]
+__all__ = ["amplitude_at", "cancelling", "change_of_cycles"]
 
 _log = logging.getLogger(__name__)
 
 _SINE_LIKE = 0.5  # of the largest displacement, that the fundamental's amplitude reaches where a motion is a sine's
+_REPEATS = 0.6  # largest change from cycle to cycle over the motion; three cycles with half a cycle of ramp: 0.50
 
 
 def cancelling(loop: ClosedLoop | PluggedLoop, target: Target, sine: str) -> ClosedLoop:
@@ -56,10 +57,16 @@ def cancelling(loop: ClosedLoop | PluggedLoop, target: Target, sine: str) -> Clo
         raise SimulationError(
             f"--cancel {sine}: the motion has nothing at {frequency:g} Hz in {axis}; name its own axis"
         )
+    little = "cancellers are for motions like a sine, and do little for this one"
     if most < _SINE_LIKE * largest:
         _log.warning(
             f"--cancel {sine}: at {frequency:g} Hz the motion has at most {100.0 * most / largest:.2g} % of its "
-            f"largest displacement in {axis}; cancellers are for motions like a sine, and do little for this one"
+            f"largest displacement in {axis}; {little}"
+        )
+    elif (change := change_of_cycles(x, frequency)) > _REPEATS:
+        _log.warning(
+            f"--cancel {sine}: the motion does not repeat itself at {frequency:g} Hz (from one cycle to the next it "
+            f"changes by {100.0 * change:.0f} % of its RMS displacement in {axis}); {little}"
         )
     count = min(int(numbers.harmonics), int(high / frequency))
     controller = with_cancellers(loop.controller, axis, frequency, count, numbers.time_constant)
@@ -74,3 +81,14 @@ def amplitude_at(x: Array, frequency: float) -> Array:
     cycle = max(1, round(SAMPLE_RATE / frequency))
     parts = [uniform_filter1d(part, cycle, mode="constant") for part in ((x * turning).real, (x * turning).imag)]
     return 2.0 * np.hypot(*parts)
+
+
+def change_of_cycles(x: Array, frequency: float) -> float:
+    """RMS difference of a signal and itself a cycle earlier, over its RMS, where the amplitude is above half of it.
+
+    A steady sine of that frequency has 0, noise the square root of 2.
+    """
+    cycle = max(1, round(SAMPLE_RATE / frequency))
+    amplitude = amplitude_at(x, frequency)
+    strong = np.flatnonzero(amplitude[cycle:] > 0.5 * amplitude.max()) + cycle
+    return float(np.linalg.norm(x[strong] - x[strong - cycle]) / np.linalg.norm(x[strong])) if len(strong) else math.inf

@@ -115,7 +115,8 @@ def guess_map(
     further = [source for source, _ in unknown if str(source.column).startswith(_FURTHER)]
     unknown = [(source, why) for source, why in unknown if source not in further]
     if further:
-        remarks.append(f"{shown([str(s.column) for s in further])}: further variables of an export, which need no line")
+        names = shown([str(s.column) for s in further])
+        remarks.append(f"{names}: further variables of an export; an import leaves them out")
     remarks += [f"{source_line(_PLACEHOLDER, source)}  # {why}{_possible(source, free)}" for source, why in unknown]
     if unknown:
         remarks.append(f"{_PLACEHOLDER} is one of: {_short(free)}")

@@ -289,7 +289,7 @@ def _proof_blocks(found: Discovery) -> list[Block]:
         return ["No test was held out; name one with --hold-out."]
     closure = (
         "Floor: expected of a model that lacks nothing, by sensor noise, uncertain numbers and oil that warms. "
-        "Closure: (refitted − with the effects) ∕ (refitted − floor); –: not applicable, already at the floor."
+        "Closure: (refitted − with the effects) ∕ (refitted − floor), by chance above 100 %; –: already at the floor."
     )
     return [
         gap_figure(found),

@@ -28,6 +28,7 @@ from lhpost6_pin.mechanics.port_path import ports_along
 from lhpost6_pin.mechanics.pose import PlatenMotion, leg_displacements, plant_motion
 from lhpost6_pin.mechanics.strokes import stroke_ends
 from lhpost6_pin.motions import find_motion, make_target, with_scale
+from lhpost6_pin.simulation.ledger import force_ledger
 from lhpost6_pin.simulation.motion_limits import check_motion_limits, fitting_scale, judge_motion, judge_record
 from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.simulation.simulate import OpenLoop, simulate
@@ -384,3 +385,44 @@ def test_a_motion_at_the_scale_that_fits_leaves_no_stroke_and_none_of_its_limits
     assert not stroke_ends(plant, test.run.time, achieved)
     peaks = judge_record(plant, test.record, fits=False).peaks
     assert max(peak.utilisation for peak in peaks if peak.decides) <= 1.0
+
+
+OSCILLATOR = """[mass]
+mass = {{ value = 201, unit = "t" }}
+centre_of_gravity = {{ value = [0, 0, 2.985], unit = "m" }}
+inertia = {{ value = [3e4, 3e4, 3e4], unit = "kg m2" }}
+[modes]
+frequency = {{ value = [{frequency}], unit = "Hz" }}
+damping = {{ value = [0.02], unit = "1" }}
+participation = {{ value = [[0, 447.2, 0, -1341.6, 0, 0]], unit = "sqrt(kg)" }}
+"""
+
+
+@pytest.mark.parametrize("frequency", [2.0, 30.0], ids=["in resonance", "far above the motion"])
+def test_an_achieved_motion_is_judged_with_the_response_of_the_specimen(frequency, tmp_path):
+    """200 t at 3 m were taken as locked: 30 % of the reaction mass's strength where the actuators gave 125 % of it."""
+    path = tmp_path / "oscillator.toml"
+    path.write_text(OSCILLATOR.format(frequency=frequency))
+    machine = load_machine().with_specimen(path)
+    target = make_target(find_motion("sine", axis="y", amplitude=0.02, period=0.5, cycles=6), rate=float(SAMPLE_RATE))
+    test = rehearse(machine, target, load_controller("lhpost6"), attrs={}, engine="fused", beyond_limits=True)
+    plant, record = test.run.plant, test.record
+    peaks = {(peak.quantity, peak.name): peak.value for peak in judge_record(plant, record, fits=False).peaks}
+    ledger = force_ledger(test.run)
+    table = [k for k, name in enumerate(ledger.effects) if name not in ("gravity", "specimen_modes")]
+    given = np.abs(ledger.wrench[:, table, 1].sum(axis=1)).max()  # of actuators, struts, seals and pads
+    assert abs(peaks["reaction mass strength", "y"]) == pytest.approx(given, rel=1e-3)  # the step's error
+    locked = {(p.quantity, p.name): p.value for p in judge_record(plant, record.drop_vars("specimen_wrench")).peaks}
+    ratio = abs(peaks["reaction mass strength", "y"] / locked["reaction mass strength", "y"])
+    assert ratio > 2.0 if frequency == 2.0 else ratio == pytest.approx(1.0, abs=0.02)  # (2 Hz / 30 Hz)^2 = 0.4 %
+
+
+def test_of_a_rigid_specimen_the_response_is_that_of_its_inertia(tmp_path):
+    machine = load_machine().with_specimen(block(tmp_path, z=2.0))
+    target = sine("y", 1.0)
+    test = rehearse(machine, target, load_controller("lhpost6"), attrs={}, engine="fused")
+    one, two = (
+        judge_record(test.run.plant, r, fits=False) for r in (test.record, test.record.drop_vars("specimen_wrench"))
+    )
+    for known, rigid in zip(one.peaks, two.peaks, strict=True):
+        assert known.utilisation == pytest.approx(rigid.utilisation, rel=1e-6, abs=1e-9), known.quantity  # rounding

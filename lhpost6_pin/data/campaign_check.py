@@ -11,13 +11,14 @@ from ..machine.parameters import Parameters
 from ..mechanics.plant import make_plant
 from .channels import LAYOUT
 from .consistency import ConsistencyFinding, check_sensors
-from .filled_samples import between_gaps, stated_constants
+from .filled_samples import stated_constants
 from .measured_sensors import NoiseComparison, compare_noise, measured_sensors, with_measured_noise
 from .noise_levels import noise_levels
 from .observable import Observable, observable
 from .records import is_measured
 from .rests import restless
 from .sensors import SensorSet, load_sensors, make_sensors
+from .served_samples import part_compared
 from .turned_displacement import turned_displacement
 
 __all__ = ["CampaignCheck", "check_campaign", "contradicting_sensors"]
@@ -84,7 +85,7 @@ def check_campaign(machine: Machine, records: Sequence[xr.Dataset], sensors: str
     Sensors, by name or file, are by default those that the machine file names, else as the records show them. Raises
     what `load_sensors` does.
     """
-    own = (between_gaps(r) for r in records if is_measured(r) and _of(machine, r))
+    own = (part_compared(r) for r in records if is_measured(r) and _of(machine, r))
     measured = [turned_displacement(r, machine)[1] for r in own]
     if not measured:
         return None

@@ -20,6 +20,7 @@ from ..core.cholesky import solve_positive
 from ..core.compiled import compiled
 from ..machine.strength import stated_strength
 from .gas_pressure import strut_pressures
+from .interface_wrench import bare
 from .payload import lock_joints
 from .plant import Plant
 from .ports import evaluate_ports, platen_pose
@@ -66,12 +67,16 @@ def force_range(plant: Plant) -> ForceRange:
     )
 
 
-def required_forces(plant: Plant, motion: PlatenMotion, legs: Array | None = None) -> RequiredForces:
-    """Shares of the actuators' ranges that a motion of C and Euler angles requires; joints of a specimen are locked.
+def required_forces(
+    plant: Plant, motion: PlatenMotion, legs: Array | None = None, specimen: Array | None = None
+) -> RequiredForces:
+    """Shares of the actuators' ranges that a motion of C and Euler angles requires.
 
-    legs (n, n_legs): elongations of the legs on this motion (`leg_displacements`), where they are known.
+    legs (n, n_legs): elongations of the legs on this motion (`leg_displacements`), where they are known. specimen
+    (n, 6): wrench of the specimen on the platen at B in platen axes [N, N m], where it is known; without it the
+    specimen is one rigid body, its joints locked.
     """
-    plant = lock_joints(plant)
+    plant = lock_joints(plant) if specimen is None else bare(plant)
     if legs is None:
         legs, _ = leg_displacements(plant, motion.displacement)
     rooms = [a.room for a in plant.machine.actuators]
@@ -80,6 +85,8 @@ def required_forces(plant: Plant, motion: PlatenMotion, legs: Array | None = Non
     moved = plant_motion(plant, motion)
     turn = rotation(motion.displacement[:, 3:])
     wrench = required_wrench(plant, moved, turn)
+    if specimen is not None:
+        wrench[:, plant.axes] -= specimen[:, plant.axes]
     elongation = np.where(reachable, legs[:, plant.spools :], 0.0)
     pull = -strut_pressures(plant.machine, elongation) * [s.area for s in plant.machine.struts]
     share, span = np.zeros((len(wrench), plant.spools)), force_range(plant)

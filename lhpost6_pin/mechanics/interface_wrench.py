@@ -24,8 +24,8 @@ from .rigid_body import make_model
 from .schemes import TAU, V_SEEN
 from .workspace import make_workspace
 
-__all__ = ["INTERFACE_AXES", "at_interface", "bare", "driven_specimen", "interface_force", "interface_lever"]
-__all__ += ["specimen_wrenches", "wrenches_at_b"]
+__all__ = ["INTERFACE_AXES", "at_interface", "bare", "driven_specimen", "from_interface", "interface_force"]
+__all__ += ["interface_lever", "specimen_wrenches", "wrenches_at_b"]
 
 _HEAVY = 1e15
 """Inertia [kg, kg m2] of a platen whose acceleration no specimen changes by more than rounding."""
@@ -53,6 +53,13 @@ def at_interface(plant: Plant, wrench: Array) -> Array:
     """Wrenches (n, 6) at the interface of those at B, both in platen axes [N, N m]."""
     out = wrench.copy()
     out[:, 3:] -= np.cross(interface_lever(plant), wrench[:, :3])
+    return out
+
+
+def from_interface(plant: Plant, wrench: Array) -> Array:
+    """Wrenches (n, 6) at B of those at the interface, both in platen axes [N, N m]. Inverse of `at_interface`."""
+    out = wrench.copy()
+    out[:, 3:] += np.cross(interface_lever(plant), wrench[:, :3])
     return out
 
 

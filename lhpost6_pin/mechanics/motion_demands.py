@@ -33,7 +33,13 @@ class DemandCheck(Protocol):
     """A `MotionCheck`, also of motion that was achieved."""
 
     def __call__(
-        self, displacement: Array, velocity: Array, acceleration: Array, *, achieved: bool = False
+        self,
+        displacement: Array,
+        velocity: Array,
+        acceleration: Array,
+        *,
+        achieved: bool = False,
+        specimen: Array | None = None,
     ) -> list[Demand]:
         """Demands of a motion, (n, 6) each."""
         ...
@@ -44,7 +50,8 @@ def make_motion_check(plant: Plant) -> DemandCheck:
 
     Valves can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load; of strokes
     limits.stroke_reserve is kept for overshoot. In a motion that was `achieved` these have taken what they needed:
-    there is no reserve.
+    there is no reserve. The wrench `specimen` (n, 6) of what is mounted, on the platen at B in platen axes [N, N m],
+    is that of its response where it is known; without it the specimen is one rigid body.
     Raises SimulationError or OutOfRangeError if the actuators cannot hold what is mounted at rest.
     """
     machine = plant.machine
@@ -55,7 +62,14 @@ def make_motion_check(plant: Plant) -> DemandCheck:
     along, span = axis_capacity(plant), force_range(plant)
     single = np.array([a.area_b is None for a in machine.actuators])
 
-    def check(displacement: Array, velocity: Array, acceleration: Array, *, achieved: bool = False) -> list[Demand]:
+    def check(
+        displacement: Array,
+        velocity: Array,
+        acceleration: Array,
+        *,
+        achieved: bool = False,
+        specimen: Array | None = None,
+    ) -> list[Demand]:
         kept = machine.limits
         flow, travel = (0.0, 0.0) if achieved else (kept.valve_reserve, kept.stroke_reserve)
         speeds, usable = (1.0 - flow) * full, (1.0 - travel) * strokes
@@ -66,7 +80,7 @@ def make_motion_check(plant: Plant) -> DemandCheck:
             Demand("actuator velocity", names, fed, OF_SPEED + less_reserve(flow), rate),
             Demand("actuator stroke", names, np.abs(moved) / usable, "of its stroke" + less_reserve(travel), moved),
         ]
-        needed = required_forces(plant, PlatenMotion(displacement, velocity, acceleration), legs)
+        needed = required_forces(plant, PlatenMotion(displacement, velocity, acceleration), legs, specimen)
         beyond, at = needed.share - rest.share, rest.share[0]
         push, pull = np.maximum(beyond, 0.0) / (1.0 - at), np.maximum(-beyond, 0.0) / (1.0 + at)
         more, less = span.half * np.maximum(beyond, 0.0), span.half * np.maximum(-beyond, 0.0)  # of force, from rest

@@ -22,6 +22,7 @@ from ..machine.machine import Machine
 from ..machine.strength import stated_strength
 from ..machine.structure import FLOW_READINGS
 from ..mechanics.capacity import with_all_valves
+from ..mechanics.interface_wrench import from_interface
 from ..mechanics.motion_demands import make_motion_check
 from ..mechanics.plant import Plant, make_plant
 from ..mechanics.pose import PlatenMotion
@@ -111,15 +112,20 @@ class Judgement(NamedTuple):
     fits: float | None  # None: no target
 
 
-def judge_motion(plant: Plant, motion: PlatenMotion, target: Target | None = None) -> Judgement:
+def judge_motion(
+    plant: Plant, motion: PlatenMotion, target: Target | None = None, specimen: Array | None = None
+) -> Judgement:
     """Demands of an achieved motion on all limits, none refused; raises as `make_motion_check` does.
 
-    These are the full ones; the scale at which the target fits keeps the reserves of valve flow, strokes and
-    displacements.
+    specimen (n, 6): its wrench on the platen at B in platen axes [N, N m] in this motion; without it the specimen is
+    one rigid body, as it is of the target. Limits are the full ones; the scale at which the target fits keeps the
+    reserves of valve flow, strokes and displacements.
     """
     bounds, check = _axis_limits(plant), make_motion_check(plant)
     fits = None if target is None else largest_scale(target, bounds, check)
-    return Judgement(limit_peaks(motion, replace(bounds, reserve=0.0), partial(check, achieved=True)), fits)
+    return Judgement(
+        limit_peaks(motion, replace(bounds, reserve=0.0), partial(check, achieved=True, specimen=specimen)), fits
+    )
 
 
 def judge_record(plant: Plant, record: xr.Dataset, *, fits: bool = True) -> Judgement | None:
@@ -135,7 +141,15 @@ def judge_record(plant: Plant, record: xr.Dataset, *, fits: bool = True) -> Judg
         attrs = record.attrs
         made = Reference(str(attrs.get("motion", "motion")), "record", float(attrs["scale"]), (), 0.0, 0.0, 0.0)
         target = Target(record["time"].values, *wanted, made)
-    return judge_motion(plant, achieved, target)
+    return judge_motion(plant, achieved, target, _response_of(plant, record))
+
+
+def _response_of(plant: Plant, record: xr.Dataset) -> Array | None:
+    """Wrench (n, 6) of the specimen on the platen at B in platen axes, as a simulated record has it; else None."""
+    if plant.machine.specimen is None or "specimen_wrench" not in record:
+        return None
+    wrench = np.asarray(record["specimen_wrench"].values, float)
+    return from_interface(plant, wrench) if np.isfinite(wrench).all() else None
 
 
 def _motion_of(record: xr.Dataset, who: str) -> PlatenMotion | None:

@@ -87,6 +87,7 @@ from lhpost6_pin.identification.calibration.problem import Problem
 from lhpost6_pin.identification.calibration.sensor_errors import corrected_record
 from lhpost6_pin.identification.inverse_dynamics import leg_wrenches
 from lhpost6_pin.identification.validation import validate
+from lhpost6_pin.identification.validation.prepare_tests import validation_numbers
 from lhpost6_pin.laws.supply import Supply
 from lhpost6_pin.laws.tabulated import NODES
 from lhpost6_pin.machine.library import families, find_family
@@ -1249,6 +1250,7 @@ def test_traces_are_those_of_the_model_with_the_largest_error(found):
     (one,) = found.proof.traces
     assert (one.phase, one.test) == ("inverse dynamics", "TZ")
     assert one.models.shape == (len(one.time), 3)
+    assert one.time[0] == validation_numbers().edge  # the ends of the filters, which no error counts, are not drawn
     error = np.std(one.models - one.measured[:, None], axis=0)
     assert np.all(error < 0.2 * np.std(one.measured))  # all of them follow what was measured
     assert one.noise > 0.0

@@ -21,6 +21,8 @@ from .results_folder import RUN_FILES
 if TYPE_CHECKING:
     import xarray as xr
 
+    from ..core.arrays import Array
+    from ..machine.machine import Machine
     from ..motions import Target
     from ..simulation.loops import ClosedLoop, PluggedLoop
     from ..simulation.rehearse import SimulatedTest
@@ -139,14 +141,17 @@ def open_loop(
     out: opt.Out = None,
     json: opt.Json = False,
 ) -> None:
-    """Drive the plant by recorded spools from recorded pressures (open loop); writes record.nc and report.html."""
-    from ..data.measured_sensors import find_sensors
-    from ..data.quiet_spools import quiet_spools
-    from ..data.records import is_measured, load_record
+    """Drive the plant by recorded spools from recorded pressures (open loop); writes record.nc and report.html.
+
+    At the start seals and pads hold what the balance of measured forces shows. A recording that tripped is used up to
+    its trip.
+    """
+    from ..data.records import load_record
+    from ..data.served_samples import cut_notes, part_compared
     from ..simulation.rehearse import replay
 
     bare = machine.load_bare()
-    measured = load_record(record, bare.labels)
+    measured = part_compared(load_record(record, bare.labels))
     table = machine.onto_for(bare, [measured])
     options = steps.checked(table)
     test = opt.record_name(record, measured.attrs)
@@ -155,15 +160,40 @@ def open_loop(
     attrs = {"test": name, "title": f"{test}, open loop", "source": f"spools of {record}"}
     if (made := str(measured.attrs.get("specimen", table.mounted))) != table.mounted:
         log.warning("%s: was recorded with specimen %s, this run has %s", record, made, table.mounted)
-    driving = measured
-    if is_measured(measured):  # else the sensors need not be known
+    driving, friction, note = _driving(table, measured)
+    with progress_bar(f"{name} on {table.name}") as progress:
+        simulated = replay(table, driving, attrs=attrs, friction=friction, progress=progress, **options)
+    save_run(simulated, folder, json, against=measured, notes=[*cut_notes(measured), *filter(None, [note])])
+
+
+def _driving(table: "Machine", record: "xr.Dataset") -> "tuple[xr.Dataset, Array | None, str]":
+    """A record with the spools that drive a model, the friction held at its start, and a sentence on that.
+
+    Of a simulated record spools are as they are. What sensors are not known for is a warning.
+    """
+    from ..data.measured_sensors import find_sensors
+    from ..data.quiet_spools import quiet_spools
+    from ..data.records import is_measured
+    from ..identification.friction_start import start_note, start_of_record
+    from ..mechanics.plant import make_plant
+
+    sensors, driving = None, record
+    if is_measured(record):
         try:
-            driving = quiet_spools(measured, find_sensors(table, [measured]))
+            sensors = find_sensors(table, [record])
+            driving = quiet_spools(record, sensors)
         except RecordError as error:
             log.warning("the noise of the spools is not known, and drives the model with them: %s", error)
-    with progress_bar(f"{name} on {table.name}") as progress:
-        simulated = replay(table, driving, attrs=attrs, progress=progress, **options)
-    save_run(simulated, folder, json, against=measured)
+            return record, None, ""
+    plant = make_plant(table.as_tested(record.attrs, "the record"))
+    if plant.flexible:  # its wrench is not known
+        return driving, None, ""
+    try:
+        friction = start_of_record(plant, record, sensors)
+    except RecordError as error:
+        log.warning("what seals and pads hold at the start is not known, nothing is assumed: %s", error)
+        return driving, None, ""
+    return driving, friction, start_note(plant, friction)
 
 
 @command()
@@ -239,12 +269,13 @@ def save_run(
     more: Sequence[Path] = (),
     leave_out: Collection[str] = (),
     record_every: int = 1,
+    notes: Sequence[str] = (),
 ) -> None:
     """Write the record and the report, a comparison if it is `against` a measured test; print a summary.
 
     interaction: of table and specimen, for the report; more: files that were written before; leave_out: those of
-    `RUN_FILES` that are not written; record_every: the file of the record keeps every such sample. Report and summary
-    are of all.
+    `RUN_FILES` that are not written; record_every: the file of the record keeps every such sample, report and summary
+    are of all; notes: sentences on how it was run, for the report.
 
     Raises typer.Exit if the run stopped on the way.
     """
@@ -263,7 +294,7 @@ def save_run(
     remarks = run_remarks(done)
     for remark in remarks:
         log.warning("%s", remark)
-    notes, command = notes_of_run(done, remarks), repeating_command()
+    notes, command = [*notes, *notes_of_run(done, remarks)], repeating_command()
     entries: dict[str, Any]
     if against is None:
         summary = write_test_report(done.plant, record, path, notes, command=command, interaction=interaction)

@@ -23,6 +23,7 @@ from ..data.campaign import Campaign
 from ..data.sensors import SensorSet
 from ..identification.calibration.prepare import as_simulated
 from ..identification.validation import PHASES, Phase, validate
+from ..identification.validation.prepare_tests import Numbers
 from ..machine.machine import Machine
 from .floor import COMPARED, NOISE, expected_gaps, model_at, normalised_error
 from .search import without_effect
@@ -107,13 +108,17 @@ def prove(
                 shares = {n: 1.0 - (after / error) ** 2 for n, error in zip(names, errors, strict=False) if error > 0.0}
                 floor = floors.get((test, number), NOISE)
                 gaps.append(Gap(PHASES[number], test, delivered, refitted, after, floor, shares))
-                traces.append((refitted, _traces(PHASES[number], test, [p for p in each if p is not None])))
+                drawn = _traces(PHASES[number], test, [p for p in each if p is not None], done[-1].numbers)
+                traces.append((refitted, drawn))
     traces.sort(key=lambda pair: -pair[0])
     return Proof(tuple(gaps), tuple(one for _, one in traces if one is not None))
 
 
-def _traces(name: str, test: str, three: Sequence[Phase]) -> GapTraces | None:
-    """The three models in the column where the refitted one errs most, in noise of the last; None without any."""
+def _traces(name: str, test: str, three: Sequence[Phase], numbers: Numbers) -> GapTraces | None:
+    """The three models in the column where the refitted one errs most, in noise of the last; None without any.
+
+    Of the samples that are compared: the ends of the filters are not exact.
+    """
     noise = {(a.quantity, a.column): a.noise for a in three[-1].agreement if a.moves and a.noise > 0.0}
     compared = [a for a in three[1].agreement if a.quantity in COMPARED[three[1].number] and np.isfinite(a.error)]
     compared = [a for a in compared if (a.quantity, a.column) in noise]
@@ -127,5 +132,6 @@ def _traces(name: str, test: str, three: Sequence[Phase]) -> GapTraces | None:
     each = [(p.measured, p.model, p.columns.index(worst.column)) for p in found]
     models = np.stack([model[:, k] for _, model, k in each], axis=1)
     measured, _, k = each[-1]
-    named = worst.quantity, worst.column
-    return GapTraces(name, test, *named, three[-1].time, measured[:, k], models, noise[named])
+    named, time = (worst.quantity, worst.column), three[-1].time
+    part = numbers.inside(len(time), float(time[1] - time[0]))
+    return GapTraces(name, test, *named, time[part], measured[part, k], models[part], noise[named])

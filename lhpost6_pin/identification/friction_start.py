@@ -9,21 +9,24 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..core.files import models_folder
 from ..data.records import is_measured
+from ..data.sensors import SensorSet
+from ..data.signals import Band
 from ..effects.registry import law_of, states_of
 from ..machine.parameters import load_parameters
 from ..mechanics.plant import Plant
 from ..mechanics.pose import plant_motion
 from .inverse_dynamics import leg_wrenches, with_loads
-from .prepare import MeasuredTest, actuator_forces
+from .prepare import AS_RECORDED, MeasuredTest, actuator_forces, prepare_test
 from .residual_kernels import row_wrenches
 from .residuals import Path, evaluate_residuals, follow
 
-__all__ = ["estimate_start", "largest_share", "start_deviation", "start_wrenches"]
+__all__ = ["estimate_start", "largest_share", "start_deviation", "start_note", "start_of_record", "start_wrenches"]
 
 APART, NEAR = 0.5, 1e-3
 """Change of a state, of full friction, either way, by which that of the wrench is taken; and so without noise, where
@@ -110,6 +113,25 @@ def estimate_start(plant: Plant, test: MeasuredTest, cutoff: float) -> Array:
         spread = stays + rest.varying.std(axis=0)
         state = balance.fitted(state, rest, none, white=nth == 0, spread=spread)
     return state
+
+
+def start_of_record(plant: Plant, record: xr.Dataset, sensors: SensorSet | None) -> Array:
+    """Friction's states (n_states,) at the start of a record: `estimate_start` up to decompose's cutoff.
+
+    Without sensors the platen's motion is the record's own.
+
+    Raises RecordError for a record without platen motion, or with a channel of it that is not finite.
+    """
+    cutoff = _number("comparison.cutoff")
+    band = Band(high=cutoff, order=int(_number("comparison.order")))
+    return estimate_start(plant, prepare_test(plant, record, sensors, AS_RECORDED._replace(band=band)), cutoff)
+
+
+def start_note(plant: Plant, start: Array) -> str:
+    """What `start` (n_states,) holds, as a sentence; empty if nothing."""
+    share = largest_share(plant, start)
+    held = f"{100.0 * share:.0f} % of their friction"
+    return f"Seals or pads hold up to {held} at the start, by the balance of forces." if share else ""
 
 
 def _without_noise(balance: "_Balance", measured: Array) -> Array:

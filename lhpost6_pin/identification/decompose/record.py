@@ -28,7 +28,7 @@ from ...machine.parameters import Parameters, load_parameters
 from ...mechanics.interface_wrench import bare
 from ...mechanics.plant import Plant, make_plant
 from ...mechanics.pose import PlatenMotion
-from ..friction_start import estimate_start, largest_share
+from ..friction_start import estimate_start, start_note
 from ..inverse_dynamics import Decomposition, inverse_dynamics
 from ..known_slip import UNKNOWN_SLIP, slip_summary
 from ..prepare import (
@@ -190,9 +190,7 @@ def decompose_test(
         notes.append(f"Simulated without noise: the platen's motion is the record's own{step}")
     if start is None:
         start = estimate_start(plant, test, decompose_numbers().number("comparison.cutoff"))
-        if share := largest_share(plant, start):
-            held = f"{100.0 * share:.0f} % of their friction"
-            notes.append(f"Seals or pads hold up to {held} at the start, by the balance of forces.")
+        notes += filter(None, [start_note(plant, start)])
     time = record["time"].values
     floors = test.channels.get("floor_acceleration") if plant.machine.floors else None
     modelled = mounted if mounted is not plant and floors is None and mounted.coupled is None else None

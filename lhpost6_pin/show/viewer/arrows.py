@@ -13,7 +13,7 @@ from ...core.arrays import Array
 from ...machine.machine import Machine
 from ..urdf import drawing_rgb, drawing_size
 
-__all__ = ["OPACITY", "arrow_colours", "arrow_sizes", "arrow_solid", "largest_force"]
+__all__ = ["OPACITY", "arrow_colours", "arrow_sizes", "arrow_solid", "kilonewtons", "largest_force"]
 
 
 CORNERS = 20
@@ -25,6 +25,11 @@ OPACITY = 0.95
 def largest_force(force: Array) -> float:
     """Largest magnitude of forces (n, n_legs) [N], of which the arrow is longest; 1 N where all are zero."""
     return max(float(np.nanmax(np.abs(force))), 1.0)
+
+
+def kilonewtons(force: float) -> str:
+    """A force [N] with its unit for reading, of a machine of any size: 1,760 kN, 6.63 kN, 0.12 kN."""
+    return f"{force / 1e3:,.0f} kN" if force >= 1e5 else f"{force / 1e3:.3g} kN"
 
 
 def arrow_sizes(machine: Machine, force: Array, largest: float) -> Array:

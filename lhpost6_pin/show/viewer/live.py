@@ -18,7 +18,7 @@ from ...simulation.limit_use import plant_limits, sample_shares
 from ...simulation.snapshot import Snapshot, Watch
 from ..bodies import body_name, body_poses, joint_positions, load_bodies
 from ..urdf import legs
-from .arrows import OPACITY, arrow_colours, arrow_sizes, largest_force
+from .arrows import OPACITY, arrow_colours, arrow_sizes, kilonewtons, largest_force
 from .frames import AS_IT_IS, Look
 from .scene import draw_arrows, draw_machine, draw_names, table_of
 from .show import machine_legend
@@ -79,7 +79,7 @@ class LiveScene:
             arrow = self._table[f"{name}_rod"]["force"]
             arrow.set_property("scale", size.tolist())
             arrow.set_property("color", [*colour.tolist(), OPACITY])
-        words = f"{snapshot.time:.1f} s, largest force {largest_force(force) / 1e3:,.0f} kN"
+        words = f"{snapshot.time:.1f} s, largest force {kilonewtons(largest_force(force))}"
         self._window.show_state(words, self._meters(snapshot))
 
     def _meters(self, snapshot: Snapshot) -> dict[str, float]:

@@ -9,7 +9,7 @@ from ...machine.recorded_changes import changes_summary
 from ..bodies import load_bodies
 from ..urdf import drawing_colour
 from .animation import draw_animation, leg_forces
-from .arrows import largest_force
+from .arrows import kilonewtons, largest_force
 from .frames import AS_IT_IS, Frames, Look, record_frames, record_title
 from .histories import packed_histories, record_histories
 from .overlay import compare_overlaid
@@ -80,7 +80,7 @@ def _caption(machine: Machine, record: xr.Dataset, others: Sequence[xr.Dataset],
     if forces := leg_forces(machine, frames):
         assert frames.force is not None
         most = frames.full_scale or largest_force(frames.force)
-        note += f"; longest arrow {most / 1e3:,.0f} kN" + " of change since the start" * look.change
+        note += f"; longest arrow {kilonewtons(most)}" + " of change since the start" * look.change
         legend |= {"push": drawing_colour("force_push"), "pull": drawing_colour("force_pull")}
         layers["forces"] = [f"meshcat/{ROOT}/{name}_rod/force" for name in forces]
     start, end = float(frames.time[0]), float(frames.time[-1])

@@ -193,8 +193,8 @@ class MountOptions:
     def onto_for(self, table: "Machine", records: Sequence["xr.Dataset"]) -> "Machine":
         """As `onto`; without --specimen the machine with the specimen that all records state, as far as they do.
 
-        Simulated records of a table whose moving parts are described otherwise are a warning. Raises RecordError for
-        records with different specimens, or a stated one whose file is not there.
+        Records that state another specimen, and simulated ones of a table whose moving parts are described otherwise,
+        are a warning. Raises RecordError for records with different specimens, or a stated one whose file is not there.
         """
         for bodies in sorted({_bodies(r) for r in records if r.attrs.get("kind") == "simulated"} - {table.bodies}):
             log.warning(
@@ -203,11 +203,17 @@ class MountOptions:
                 bodies, table.name, table.bodies, bodies,
             )  # fmt: skip
         if self.specimen is not None or not records:
-            return self.onto(table)
-        stated = {_specimen_words(record.attrs): record for record in records}
-        if len(stated) > 1:
-            raise RecordError(f"the records were made with different specimens: {'; '.join(stated)}")
-        (record,) = stated.values()
+            mounted = self.onto(table)
+            stated = {str(record.attrs.get("specimen", mounted.mounted)) for record in records}
+            for made in sorted(stated - {mounted.mounted}):
+                log.warning(
+                    "recorded with specimen %s, as the record states; --specimen mounts %s", made, mounted.mounted
+                )
+            return mounted
+        by_specimen = {_specimen_words(record.attrs): record for record in records}
+        if len(by_specimen) > 1:
+            raise RecordError(f"the records were made with different specimens: {'; '.join(by_specimen)}")
+        (record,) = by_specimen.values()
         self.onto(table)  # raises for --locked without --specimen
         if "specimen_file" not in record.attrs:  # its place is not stated: what needs it says so
             return table

@@ -158,8 +158,6 @@ def open_loop(
     name = f"{test}_open_loop"
     folder = opt.folder_for(out, name, *RUN_FILES, inputs=[record])
     attrs = {"test": name, "title": f"{test}, open loop", "source": f"spools of {record}"}
-    if (made := str(measured.attrs.get("specimen", table.mounted))) != table.mounted:
-        log.warning("%s: was recorded with specimen %s, this run has %s", record, made, table.mounted)
     driving, friction, note = _driving(table, measured)
     with progress_bar(f"{name} on {table.name}") as progress:
         simulated = replay(table, driving, attrs=attrs, friction=friction, progress=progress, **options)

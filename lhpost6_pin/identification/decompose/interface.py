@@ -9,6 +9,7 @@ the bare table's parameters, propagated linearly and added in squares (`agreemen
 the standard deviations of an override, as `calibrate` writes them for a bare table, or those of the machine file.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -32,8 +33,13 @@ class InterfacePeak(NamedTuple):
     component: str  # of `INTERFACE_AXES`
     value: float  # [N, N m]
     time: float  # [s]
-    half_width: float  # of the interval
+    half_width: float  # of the interval, which is that of all samples at once: the largest of them is taken
     predicted: float  # peak of the mounted model's, NaN without a model
+
+    @property
+    def shown(self) -> bool:
+        """Whether it is distinguished from zero."""
+        return abs(self.value) > self.half_width
 
 
 @dataclass(frozen=True)
@@ -46,6 +52,7 @@ class InterfaceWrench:
     sensors: Array  # (n, 6) by calibration errors of the sensors
     parameters: Array  # (n, 6) by the bare table's parameters
     confidence: float  # of the interval
+    crossings: float  # of zero, upwards, by the noise of a test of T seconds compared up to B hertz: B T / sqrt(3)
     floors: Array | None  # (n, 6) of the floors' masses times their accelerations; weight is not in it
     predicted: Array | None  # (n, 6) of the mounted model under the measured motion
     simulated: Array | None  # (n, 6) of the simulation itself, where the record holds it
@@ -60,8 +67,19 @@ class InterfaceWrench:
 
     @property
     def half_width(self) -> Array:
-        """Half of the interval (n, 6)."""
+        """Half of the interval (n, 6) at each instant."""
         return float(ndtri(0.5 + 0.5 * self.confidence)) * self.sd
+
+    @property
+    def peak_width(self) -> Array:
+        """Half of the interval (n, 6) of the largest sample: its noise is the largest of the whole test.
+
+        Rice's rate of crossings of a level gives that size; it is nearly certain, and adds to the other errors rather
+        than in squares.
+        """
+        one = float(ndtri(0.5 + 0.5 * self.confidence))
+        level = math.sqrt(2.0 * math.log(max(-2.0 * self.crossings / math.log(self.confidence), 1.0)))
+        return np.asarray(max(level, one) * self.noise + one * np.hypot(self.sensors, self.parameters))
 
     def at(self, sample: int) -> pin.Force:
         """Force of the specimen on the platen at one sample."""
@@ -70,7 +88,7 @@ class InterfaceWrench:
     @property
     def peaks(self) -> tuple[InterfacePeak, ...]:
         """Peaks of all components."""
-        width, found = self.half_width, []
+        width, found = np.broadcast_to(self.peak_width, self.wrench.shape), []
         for j, name in enumerate(INTERFACE_AXES):
             k = int(np.argmax(np.abs(self.wrench[:, j])))
             expected = np.nan if self.predicted is None else self.predicted[:, j]
@@ -111,6 +129,7 @@ def find_interface(found: Decomposed, noise: Array, sensors: Array, parameters: 
         sensors=sensors,
         parameters=parameters,
         confidence=decompose_numbers().number("judgement.confidence"),
+        crossings=found.comparison.band.high * len(found.time) * found.dt / math.sqrt(3.0),
         floors=None if floors is None else interface_at(found, floors),
         predicted=predicted,
         simulated=None if known is None else found.compared(known.values.astype(float)),

@@ -85,6 +85,7 @@ def interface_headlines(found: InterfaceWrench) -> list[Headline]:
         note = f"{INTERFACE_NAMES[peak.component]}, at {peak.time:.2f} s"
         if found.sd.any():
             note += f"; ± {shown_as(peak.half_width, _scale(peak.component))} at {_share(found)}"
+            note += "" if peak.shown else ", not distinguished from zero"
         tiles.append(Headline(shown_as(abs(peak.value), _scale(peak.component)), f"Peak {label}", note))
     return tiles
 
@@ -95,7 +96,8 @@ def interface_sentence(found: InterfaceWrench) -> str:
     def said(peak: InterfacePeak) -> str:
         scale = _scale(peak.component)
         width = f" ± {scaled_number(peak.half_width, scale)}" if found.sd.any() else ""
-        return f"{INTERFACE_NAMES[peak.component]} {scaled_number(abs(peak.value), scale)}{width} {scale.unit}"
+        doubt = "" if peak.shown else " (not distinguished from zero)"
+        return f"{INTERFACE_NAMES[peak.component]} {scaled_number(abs(peak.value), scale)}{width} {scale.unit}{doubt}"
 
     return f"Peaks at the interface of the specimen: {', '.join(said(peak) for peak in found.peaks[:5])}."
 
@@ -119,7 +121,8 @@ def _sources(found: InterfaceWrench) -> list[Block]:
         of = f"{found.calibrated} parameters have that of a calibration or override, {found.stated} the machine file's"
     return [
         Table("Standard deviations over time, RMS", header, rows),
-        "Interval: normal, at each instant. Noise by a second draw; gains, offsets and skews of sensors and parameters "
+        "Interval: normal, at each instant; that of a peak holds for all instants at once, since noise raises the "
+        "largest of many samples. Noise by a second draw; gains, offsets and skews of sensors and parameters "
         f"of the bare table one by one, added in squares as independent. {of}; a calibration of the bare table "
         "(“lhpost6 calibrate”, its file for --override) narrows them. Parameters without a stated deviation, and "
         "geometry, are taken as exact.",

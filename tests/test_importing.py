@@ -186,6 +186,8 @@ def test_each_line_may_end_with_a_separator_and_holes_are_nan(tmp_path):
         ("", "is empty"),
         (" \n\n", "is empty"),
         ("a,b\nc,d\n", "no row of numbers"),
+        ("t [s],x [m],state\n0.0,0.1,OK\n0.1,0.2,OK\n", "line 2, column 3: 'OK' is neither a number"),
+        ("t [s];x [m];state\n0,0;0,1;OK\n0,1;0,2;OK\n", "line 2, column 3: 'OK' is neither a number"),
         ("1,2\n3,4\n", "no header row of 2 names"),
         ("s,m\n1,2\n3,4\n", "units above the numbers, but no names"),
         ("time [s],x [m]\n0,1\n1,2\n2,two\n", r"line 4, column 'x \[m\]': 'two' is not a number"),

@@ -1,12 +1,15 @@
 """Recordings of a served plant: samples that show no sensor blame none, and what happened is stated."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
 
 from lhpost6_pin.data.campaign import Campaign
+from lhpost6_pin.data.campaign_check import contradicting_sensors
 from lhpost6_pin.data.check import check_dataset
-from lhpost6_pin.data.records import make_record
+from lhpost6_pin.data.records import load_record, make_record
 from lhpost6_pin.data.served_samples import SAFE_HOLD, cut_notes, part_compared
 from lhpost6_pin.identification.calibration import usable_tests
 from lhpost6_pin.interfaces.link import PlantState
@@ -92,3 +95,16 @@ def test_a_test_that_tripped_is_calibrated_up_to_its_trip_or_skipped(caplog):
     (kept,) = campaign.records
     assert kept.attrs["test"] == "late" and kept.sizes["time"] < 2 * RATE
     assert [one.test for one in campaign.skipped] == ["early"]
+
+
+def test_sensors_are_compared_up_to_a_trip():
+    """After it the valves are the plant's own, and the last command stays: spools were "wrong by a factor"."""
+    test = load_record(Path(__file__).parent / "data" / "records" / "practice_a_TX.nc")
+    command, spool = (test[name].values.copy() for name in ("spool_command", "spool_position"))
+    n = int(np.abs(command[:, 0]).argmax())
+    trip = f"tripped at {float(test['time'][n] - test['time'][0]):.3f} s: by Anna"
+    command[n:], spool[n:] = command[n], 0.02 * spool[n:]
+    after = test.assign(spool_command=test["spool_command"].copy(data=command))
+    after = after.assign(spool_position=test["spool_position"].copy(data=spool))
+    assert any("spool against command" in words for words in contradicting_sensors(load_machine(), [after]))
+    assert contradicting_sensors(load_machine(), [after.assign_attrs(trouble=trip)]) == ()

@@ -35,6 +35,7 @@ def check(
     from ..show.check_tables import campaign_entries, check_entries, print_check, print_tests
     from ..show.results import finding_entries
     from ..show.tables import print_findings
+    from ..show.terminal import print_blocks
 
     table = machine.load()
     if sensors_out is not None and sensors_out.exists() and not replace:
@@ -68,6 +69,8 @@ def check(
             print_tests(summaries)
         if checked is not None:
             print_check(checked)
+            if wrong:  # what a comparison of sensors does not count
+                print_blocks(f"errors, listed above, in {', '.join(sorted(wrong))}")
 
     def entries() -> dict[str, Any]:
         summary = campaign_entries(summaries)

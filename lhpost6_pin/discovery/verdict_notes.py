@@ -173,8 +173,10 @@ def form_note(found: "Discovery") -> str:
 def balance_note(balances: Sequence[Balance]) -> str:
     """What balances leave out, which decompose and validate show."""
     words = (
-        f"{EXPECTED_SCATTER} Balances are of records whose sensors' errors were corrected as fitted; model.toml holds "
-        "the machine without them, so that decompose and validate, which take records as they are, show larger errors."
+        f"{EXPECTED_SCATTER} An error below one is within it; over sensor noise alone, the unit of phases, the same "
+        "error may be many times as large. Balances are of records whose sensors' errors were corrected as fitted; "
+        "model.toml holds the machine without them, so that decompose and validate, which take records as they are, "
+        "show larger errors."
     )
     least = min((one for one in balances if one.kind == "wrench"), key=lambda one: one.slip_known, default=None)
     if least is not None and least.slip_known < 1.0:

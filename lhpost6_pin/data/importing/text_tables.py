@@ -122,7 +122,7 @@ def _why_no_row(lines: Sequence[str]) -> str:
 def _odd_field(lines: Sequence[str]) -> str:
     """The first field that is no number in the first line of which most are; empty if there is none."""
     for number, line in enumerate(lines, start=1):
-        for dialect in () if _is_comment(line) else (Dialect(s) for s in _SEPARATORS):
+        for dialect in () if _is_comment(line) else _DIALECTS:
             fields = dialect.split(line)
             odd = [k for k, field in enumerate(fields) if not _fits(field, dialect)]
             if 0 < len(odd) < 0.5 * len(fields):

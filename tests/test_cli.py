@@ -831,3 +831,12 @@ def test_a_command_searches_for_garbage_less_often_and_not_at_its_end():
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     left, threshold = map(int, ended.stdout.split()[-2:])
     assert left < 1000 and threshold == 10_000  # the command itself leaves some 50,000 objects
+
+
+def test_a_motion_of_a_wrong_unit_that_hardly_moves_the_table_is_a_warning(lhpost6, brief, caplog):
+    """S_DS of 0.3 m/s2 for 0.3 g ran without a word, and friction hid the motion."""
+    sine = ("run", "sine", "--engine", "fused", "--no-record", "--no-report", "--set")
+    lhpost6(*sine, "amplitude=5cm")
+    assert "check its unit" not in caplog.text
+    lhpost6(*sine, "amplitude=1mm")
+    assert "check its unit and scale" in caplog.text

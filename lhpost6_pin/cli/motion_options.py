@@ -1,5 +1,6 @@
 """Options that select a motion and its processing, and the target that follows."""
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -76,6 +77,12 @@ FileRotations = Annotated[
 ]
 
 
+log = logging.getLogger(__name__)
+
+_OF_MOTION = ("displacement", "velocity", "acceleration")
+_SMALL = 0.02  # share of what the table reaches in these, below which a motion is likely in a wrong unit
+
+
 @dataclass(frozen=True)
 class MotionOptions:
     """Options that select a motion and its processing."""
@@ -143,7 +150,13 @@ class MotionOptions:
             rate=float(SAMPLE_RATE),
         )
         if not beyond:
-            check_motion_limits(make_plant(table), target)
+            use = check_motion_limits(make_plant(table), target).utilisation
+            share = max(one for quantity in _OF_MOTION for one in use[quantity].values())
+            if share < _SMALL:
+                log.warning(
+                    "%s reaches at most %.2g %% of the table's displacement, velocity or acceleration: little beyond "
+                    "friction; check its unit and scale", motion.name, 100.0 * share,
+                )  # fmt: skip
         return target
 
     @property

@@ -27,5 +27,5 @@ def lost_peaks(name: str, given: np.ndarray, kept: np.ndarray, corner: float, al
     return (
         f"{name}: the low-pass at {corner:g} Hz leaves {left[k]:.3g} {unit} of its peak of {peak[k]:.3g} {unit} in "
         f"{AXES[k]}{f' (less of {others}, too)' if others else ''}: that is the target. A higher --low-pass keeps more "
-        "of it there, not on a table whose band ends at that corner"
+        "of it, as far as the table's band reaches"
     )

@@ -187,6 +187,7 @@ def grid_figure(
     layout = _cells_layout(len(rows), cell, BETWEEN, above=44, left=62, right=12) | {"hovermode": "closest"}
     inner = len(rows) * cell + (len(rows) - 1) * BETWEEN
     layout["legend"] = {"orientation": "h", "x": 1, "xanchor": "right", "y": 1 + 20 / inner, "yanchor": "bottom"}
+    layout["legend"]["itemsizing"] = "constant"  # markers of a pixel have a visible colour there
     traces = []
     for k, plot in enumerate(plot for row in rows for plot in row):
         r, c = divmod(k, columns)

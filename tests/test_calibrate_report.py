@@ -367,5 +367,8 @@ def test_a_simulated_campaign_can_be_loaded_and_is_not_added_to(lhpost6, tmp_pat
 def test_tests_that_a_campaign_has_not_and_folders_that_are_none_are_named(lhpost6, tmp_path):
     for tests, words in (("TX,TX", "twice"), ("TX,QQ", "QQ")):
         assert refused(lhpost6("campaign", "--machine", "uniaxial", "--tests", tests, "--out", tmp_path), words)
+    assert refused(
+        lhpost6("campaign", "--machine", "uniaxial", "--scale", "0", "--out", tmp_path), "nothing would move"
+    )
     for folder, words in ((tmp_path / "gone", "not a directory"), (tmp_path, "holds no record")):
         assert refused(lhpost6("calibrate", folder), str(folder), words)

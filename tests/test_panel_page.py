@@ -160,6 +160,7 @@ def test_a_table_is_started_driven_tripped_reset_and_recorded(panel):
             await anna.refused("no program", "run")
             await anna.refused("span of x is zero", "generator", wave="sine", frequency=0.5, axes=["x"])
             await anna.refused("span of x: 2000 mm; the limit is 890 mm", "span", axis="x", value=2.0)
+            await anna.refused("span of x: -50 mm; it is an amplitude", "span", axis="x", value=-0.05)
             await anna.do("span", axis="x", value=0.1)
             await anna.until(lambda: anna.state["span"][0] == 0.1)
             await anna.refused("exceeds the capacity", "generator", wave="sine", frequency=8.0, axes=["x"])

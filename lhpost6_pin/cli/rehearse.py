@@ -227,6 +227,8 @@ def campaign(
     chosen = tuple(word.strip() for word in tests.split(",")) if tests is not None else None
     if chosen is not None and len(set(chosen)) < len(chosen):
         raise ParameterError(f"--tests {tests}: names a test twice")
+    if scale == 0.0:
+        raise ParameterError("--scale 0: nothing would move; a campaign needs motion")
     folder = opt.folder_for(out, "campaign")
     if any(folder.glob("*.nc")):
         raise ParameterError(f"--out {folder}: holds records already, which would count as tests; name another folder")

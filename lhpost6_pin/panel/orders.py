@@ -82,14 +82,16 @@ class Orders:
         """A setpoint or span of one axis, within what the table can do."""
         at = AXES.index(axis)
         limit = self._machine.limits.displacement[at] if at in self._plant.axes else 0.0
+        wanted, most = in_page_units(value, place_unit(axis)), in_page_units(limit, place_unit(axis))
         if not abs(value) <= limit:
-            wanted, most = in_page_units(value, place_unit(axis)), in_page_units(limit, place_unit(axis))
             raise ControllerError(f"{do} of {axis}: {wanted}; the limit is {most}")
+        if do == "span" and value < 0.0:
+            raise ControllerError(f"span of {axis}: {wanted}; it is an amplitude, zero or more")
         if self.program is not None and self.program.by_span:
             both = {"span": np.array(status.span), "setpoint": np.array(status.base)}
             both[do][at] = value
             check_program(self._plant, self.program, both["span"], both["setpoint"])
-        what = f"sets the {do} of {axis} to {in_page_units(value, place_unit(axis))}"
+        what = f"sets the {do} of {axis} to {wanted}"
         return {"do": do, "axis": at, "value": value, "what": what}
 
     def _scale(self, value: float, status: Status) -> dict[str, Any]:

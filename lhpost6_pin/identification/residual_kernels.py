@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.arrays import Array
-from ..core.compiled import compiled, copy_scaled
+from ..core.compiled import compiled, compiled_inline, copy_scaled
 from ..effects.actuator import advance_line, start_line, supplied
 from ..effects.evaluate import apply_forces
 from ..effects.registry import PORTS
@@ -145,7 +145,7 @@ def oil_residuals(rows, supply, oil, ports, z, drooped, flow, valve):
                 _flow_residuals(k, rows[i], oil, (high, low), (at, speed), z, (flow[k], valve[k]))
 
 
-@compiled
+@compiled_inline
 def _follow_supply(k, rows, oil, supply, z, last):
     """Set the oil of sample k in z (n_states,), pressures as measured; returns supply and return pressure [Pa].
 
@@ -166,7 +166,7 @@ def _follow_supply(k, rows, oil, supply, z, last):
     return supply_pressures(supply, z)
 
 
-@compiled
+@compiled_inline
 def _flow_residuals(k, row, oil, supply, rod, z, filled):
     """Fill a row's chambers in flow and valve (n_chambers,): V / beta dP/dt + A dL/dt - Q, and of Q the valve's part.
 
@@ -179,25 +179,27 @@ def _flow_residuals(k, row, oil, supply, rod, z, filled):
     pressure_b = rate_b = 0.0
     if at_b >= 0:
         pressure_b, rate_b = oil.pressure[k, at_b], oil.pressure_rate[k, at_b]
-    if k == 0:
+    modified = row.modified != 0
+    if modified and k == 0:
         start_line(row, x, pressure_a, pressure_b, high, low, z)
-    else:
+    elif modified:
         advance_line(row, x, pressure_a, pressure_b, high, low, 0.5 * oil.dt, z)
-    flow_a, flow_b, _, _ = supplied(row, True, x, pressure_a, pressure_b, high, low, z)
-    across, _, out_a, out_b, _, _ = leak_flows(p, True, pressure_a, pressure_b, low)
+    flow_a, flow_b, _, _ = supplied(row, modified, x, pressure_a, pressure_b, high, low, z)
+    across, _, out_a, out_b, _, _ = leak_flows(p, modified, pressure_a, pressure_b, low)
     if oil.side.size == 0 or math.isnan(oil.side[k, i]):
-        at += rod_travel(p, True, pressure_a, pressure_b)
-        speed += rod_velocity(p, True, pressure_a, pressure_b, rate_a, rate_b)
+        at += rod_travel(p, modified, pressure_a, pressure_b)
+        speed += rod_velocity(p, modified, pressure_a, pressure_b, rate_a, rate_b)
     else:
         at += p.play * oil.side[k, i]
         speed += p.play * oil.side_rate[k, i]
-    bulk, left = oil_modulus(p, True, pressure_a)
+    bulk, left = oil_modulus(p, modified, pressure_a)
     net = flow_a - across - out_a
     flow[at_a] = rate_a * p.area_a * (p.chamber_a + at) / bulk - left * (net - p.area_a * speed)
     valve[at_a] = flow_a
     if at_b >= 0:
-        bulk, left = oil_modulus(p, True, pressure_b)
+        bulk, left = oil_modulus(p, modified, pressure_b)
         net = flow_b + across - out_b
         flow[at_b] = rate_b * p.area_b * (p.chamber_b - at) / bulk - left * (net + p.area_b * speed)
         valve[at_b] = flow_b
-    advance_line(row, x, pressure_a, pressure_b, high, low, 0.5 * oil.dt, z)
+    if modified:
+        advance_line(row, x, pressure_a, pressure_b, high, low, 0.5 * oil.dt, z)

@@ -23,24 +23,31 @@ class StartStates(NamedTuple):
     """Directions in which states at the start of a test move its whitened bins, in k columns of the residuals."""
 
     columns: NDArray[np.intp]  # (k,) those in which directions are not zero
-    directions: Complex  # (m, k, s)
-    duals: Complex  # (m, k, s): the real parts of their products with the directions are one or zero
+    directions: Array  # (2, m, k, s) real and imaginary parts
+    duals: Array  # (2, m, k, s): their products with the directions are one or zero
     removed: Array  # (s,) share of what lies along each
 
     def less(self, bins: Complex) -> Complex:
         """Whitened bins (m, c, p) less what states at the start explain of them."""
-        own = bins[:, self.columns].reshape(-1, bins.shape[2])
+        own = _parts(bins[:, self.columns])
         if not own.any():
             return bins
-        along = (self.duals.reshape(len(own), len(self.removed)).conj().T @ own).real * self.removed[:, None]
+        flat, count = own.reshape(-1, bins.shape[2]), len(self.removed)
+        along = (self.duals.reshape(-1, count).T @ flat) * self.removed[:, None]
+        flat -= self.directions.reshape(-1, count) @ along
         out = bins.copy()
-        out[:, self.columns] -= (self.directions @ along).reshape(len(bins), len(self.columns), bins.shape[2])
+        out.real[:, self.columns], out.imag[:, self.columns] = own
         return out
 
     def scaled(self, scale: Array) -> "StartStates":
         """The same for whitened bins that are larger by a scale (m, c)."""
         own = scale[:, self.columns, None]
         return self._replace(directions=self.directions * own, duals=self.duals / own)
+
+
+def _parts(x: Complex) -> Array:
+    """Real and imaginary parts (2, ...): products of them take half the work of complex ones."""
+    return np.array([x.real, x.imag])  # in C order, so that a reshaped one is a view
 
 
 def start_states(whitened: Complex) -> StartStates:
@@ -50,11 +57,11 @@ def start_states(whitened: Complex) -> StartStates:
     squares, turned = np.linalg.eigh((flat.conj().T @ flat).real)
     seen = squares > LEAST**2
     directions = flat @ (turned[:, seen] / np.sqrt(squares[seen]))
-    directions = directions.reshape(len(whitened), len(columns), int(seen.sum()))
+    directions = _parts(directions.reshape(len(whitened), len(columns), int(seen.sum())))
     return StartStates(columns, directions, directions, 1.0 - 1.0 / np.sqrt(1.0 + squares[seen]))
 
 
 def no_start_states(bins: int) -> StartStates:
     """Of a test without friction, or without forces, of so many bins."""
-    none = np.zeros((bins, 0, 0), np.complex128)
+    none = np.zeros((2, bins, 0, 0))
     return StartStates(np.zeros(0, np.intp), none, none, np.zeros(0))

@@ -41,7 +41,7 @@ from lhpost6_pin.show.viewer import (
     show_record,
 )
 from lhpost6_pin.show.viewer.animation import draw_animation
-from lhpost6_pin.show.viewer.arrows import arrow_colours, arrow_sizes, arrow_solid
+from lhpost6_pin.show.viewer.arrows import arrow_colours, arrow_sizes, arrow_solid, kilonewtons
 from lhpost6_pin.show.viewer.frames import Ghost
 from lhpost6_pin.show.viewer.histories import packed_histories, record_histories
 from lhpost6_pin.show.viewer.scene import draw_machine, draw_names
@@ -489,3 +489,8 @@ def test_histories_keep_every_peak_and_leave_out_what_has_gaps(machine, record):
     torn["actuator_force"][5, 2] = np.nan
     assert set(whole[2].curves) - set(record_histories(machine, torn)[2].curves) == {machine.actuator_names[2]}
     assert record_histories(machine, record[["platen_displacement"]])[0].title.startswith("Displacement")
+
+
+@pytest.mark.parametrize("force, words", [(1.7604e6, "1,760 kN"), (6632.0, "6.63 kN"), (120.0, "0.12 kN")])
+def test_the_longest_arrow_has_three_digits_on_machines_of_any_size(force, words):
+    assert kilonewtons(force) == words

@@ -204,11 +204,8 @@ class MountOptions:
             )  # fmt: skip
         if self.specimen is not None or not records:
             mounted = self.onto(table)
-            stated = {str(record.attrs.get("specimen", mounted.mounted)) for record in records}
-            for made in sorted(stated - {mounted.mounted}):
-                log.warning(
-                    "recorded with specimen %s, as the record states; --specimen mounts %s", made, mounted.mounted
-                )
+            for made in sorted({str(r.attrs.get("specimen", mounted.mounted)) for r in records} - {mounted.mounted}):
+                log.warning("the record states specimen %s, --specimen mounts %s", made, mounted.mounted)
             return mounted
         by_specimen = {_specimen_words(record.attrs): record for record in records}
         if len(by_specimen) > 1:

@@ -29,10 +29,10 @@ class StartStates(NamedTuple):
 
     def less(self, bins: Complex) -> Complex:
         """Whitened bins (m, c, p) less what states at the start explain of them."""
-        own = _parts(bins[:, self.columns])
-        if not own.any():
+        own, count = _parts(bins[:, self.columns]), len(self.removed)
+        if not (count and own.any()):
             return bins
-        flat, count = own.reshape(-1, bins.shape[2]), len(self.removed)
+        flat = own.reshape(-1, bins.shape[2])
         along = (self.duals.reshape(-1, count).T @ flat) * self.removed[:, None]
         flat -= self.directions.reshape(-1, count) @ along
         out = bins.copy()

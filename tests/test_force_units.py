@@ -114,6 +114,18 @@ def test_a_force_of_friction_is_not_judged_by_inertia():
     assert wrong_forces(in_unit(rubbing, "kip", "N"), GUIDED) == []
 
 
+@pytest.mark.parametrize(
+    "true, read, words",
+    [("N", "kN", "times what the actuator can give"), ("kN", "lbf", "are 1/224.8 of what inertia requires")],
+)
+def test_with_much_friction_only_a_size_that_cannot_be_is_doubted(true, read, words):
+    """Friction about as large as inertia hid a factor of 1000; right forces, and 4.45 times these, stay undoubted."""
+    rubbing = guided(friction=1.2e4)
+    (one,) = wrong_forces(in_unit(rubbing, true, read), GUIDED)
+    assert one.severity == "warning" and words in one.message
+    assert wrong_forces(rubbing, GUIDED) == [] == wrong_forces(in_unit(rubbing, "lbf", "N"), GUIDED)
+
+
 def test_the_mass_that_is_fitted_is_that_of_the_machine():
     """Without friction, force is mass times acceleration: a mass a factor four off is a warning, 2.5 is none."""
     for factor, doubted in ((4.0, True), (2.5, False), (1 / 2.5, False), (1 / 4.0, True)):

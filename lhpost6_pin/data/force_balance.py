@@ -76,6 +76,12 @@ class ForceBalance(NamedTuple):
         common = float(np.sum(self.gram[:, -1, :-1] @ factor))
         return common / max(self.required, 1e-300), common**2 / max(self.required * square, 1e-300)
 
+    def size(self, factor: Array) -> float:
+        """RMS of measured forces times `factor` (n,), with their friction, over that of what is required."""
+        whole = self.gram + self.rubbed
+        measured = float(np.einsum("i,kij,j->", factor, whole[:, :-1, :-1], factor))
+        return float(np.sqrt(measured / max(float(np.sum(whole[:, -1, -1])), 1e-300)))
+
     def of(self, group: ActuatorGroup) -> "ForceBalance":
         """The balance on the axes of a group, which judges its actuators."""
         return self._replace(gram=self.gram[group.axes], rubbed=self.rubbed[group.axes], judged=group.actuators)

@@ -13,7 +13,7 @@ that do not agree with it then, or bear nothing, by inertia.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import cache
 from itertools import combinations, permutations
 from typing import NamedTuple
@@ -71,7 +71,23 @@ def wrong_forces(record: xr.Dataset, machine: Machine) -> list[RecordFinding]:
         for one in wrong.pop("sign", [])
         for name in one.actuators
     ]
-    return turned + [_finding(units, each) for units, each in wrong.items()]
+    named = {name for each in wrong.values() for one in each for name in one.actuators}
+    return turned + [_finding(units, each) for units, each in wrong.items()] + _beyond(record, plant, named)
+
+
+def _beyond(record: xr.Dataset, plant: Plant, named: Collection[str]) -> list[RecordFinding]:
+    """A warning for each actuator, none of those `named` already, whose force is far beyond what it can give."""
+    labels, span, found = list(map(str, record["actuator"].values)), force_range(plant), []
+    most = np.maximum(np.abs(span.least), span.most)
+    for name, able in zip(plant.machine.actuator_names, most, strict=True):
+        force = columns_of(record["actuator_force"])[:, labels.index(name)]
+        share = float(np.nanmax(np.abs(force), initial=0.0) / able)
+        if name not in named and share > rest_numbers().number("force_unit.beyond"):
+            sample = int(np.nanargmax(np.abs(force)))
+            what = f"reaches {share * able:.4g} N, {share:.3g} times what the actuator can give"
+            remedy = "check its unit in the channel map, or area and supply pressure of the machine file"
+            found.append(RecordFinding("warning", f"actuator_force[{name}]", sample, what, remedy))
+    return found
 
 
 class _Search:
@@ -200,14 +216,15 @@ class _Search:
         """A size far from what is required, of all forces that are not settled, where no hypothesis holds.
 
         Not where the forces, brought to the size required, would hold much friction: what the projection leaves of it
-        is not small beside inertia then.
+        is not small beside inertia then. With it they are still not a small part of what is required.
         """
         ratio, explained = self._regression(balance)
         limit, near = self.numbers.number("force_unit.factor"), self.numbers.number("balance.near")
         rubbed = balance.friction(self.factor * balance.judged / (ratio or 1.0)) / max(balance.required, 1e-300)
+        little = balance.size(self.factor * balance.judged) * self.numbers.number("force_unit.far") < 1.0
         doubted = balance.by == "weight" or (
             explained >= self.numbers.number("force_unit.explained")
-            and rubbed <= self.numbers.number("force_unit.friction")
+            and (little or rubbed <= self.numbers.number("force_unit.friction"))
         )
         if doubted and (abs(ratio) < 1.0 / limit or (ratio > limit and not self.loaded)):
             units = [k for k in self._factors() if k > 0.0 and 1.0 / near <= ratio * k <= near]

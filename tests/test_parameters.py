@@ -225,7 +225,11 @@ def test_a_number_without_unit_far_from_the_stated_one_is_doubted(caplog):
     caplog.clear()
     machine.with_params({"horizontal.leakage": {"value": 5.0, "unit": "l/min/MPa"}, "horizontal.seal_friction": 0.0})
     machine.with_params({"horizontal.leakage": 9e-11, "platen.mass": [1e5, 1e5, 1e5]})
+    centre = machine.parameters["platen.centre_of_gravity"].value
+    machine.with_params({"platen.centre_of_gravity": (centre[0], 1e-3, centre[2])})  # a fit's; of -4.8e-7 m
     assert not caplog.text
+    machine.with_params({"platen.centre_of_gravity": tuple(1e3 * x for x in centre)})
+    assert "platen.centre_of_gravity" in caplog.text
 
 
 def test_one_component_can_have_more_servovalves_open_than_its_kind():

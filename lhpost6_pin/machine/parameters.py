@@ -160,10 +160,9 @@ def _overridden(
 
 
 def _doubt_unit(key: str, value: Value, base: Quantity) -> None:
-    """Warn where a number without unit is far from the one stated, as one in another unit is."""
-    new, old = (x if isinstance(x, Iterable) else (x,) for x in (value, base.value))
-    ratios = [abs(a / b) for a, b in zip(new, old, strict=False) if a and b]
-    if base.unit != "1" and any(abs(math.log10(ratio)) > _FAR for ratio in ratios):
+    """Warn where a number, or a vector as a whole, without unit is far from the one stated, as in another unit."""
+    new, old = (math.hypot(*x) if isinstance(x, Iterable) else abs(x) for x in (value, base.value))
+    if base.unit != "1" and new and old and abs(math.log10(new / old)) > _FAR:
         log.warning(
             "%s: %r has no unit and is taken in %s, where %r is stated; write {'value': ..., 'unit': ...}",
             *(key, value, base.unit, base.value),

@@ -65,7 +65,7 @@ function steps({ pressure, platen }) {
 function progress({ name, state, time, duration }) {
   const busy = state !== "stopped";
   write(part("program-name"), busy ? `${name}, ${state}` : `${waits() ? "Checking" : "Chosen"}: ${described()}`);
-  write(part("progress-text"), !busy ? "" : duration === null ? `${time.toFixed(1)} s, until stopped` : `${time.toFixed(1)} of ${duration.toFixed(1)} s`);
+  write(part("progress-text"), !busy ? "" : state === "stopping" ? "coming to rest" : duration === null ? `${time.toFixed(1)} s, until stopped` : `${time.toFixed(1)} of ${duration.toFixed(1)} s`);
   part("progress").value = busy && duration ? Math.min(time / duration, 1) : 0;
   write(part("program-state"), !busy && waits() ? "checking" : state);
   write(part("run"), !busy && waits() ? "Checking" : "Run");

@@ -47,6 +47,10 @@ function nice(step) { // 1, 2 or 5 times a power of ten
   const power = 10 ** Math.floor(Math.log10(step)), share = step / power;
   return (share <= 1 ? 1 : share <= 2 ? 2 : share <= 5 ? 5 : 10) * power;
 }
+function even(span) { // the largest of 1, 2 or 5 times a power of ten that fits three times: three to seven lines
+  const power = 10 ** Math.floor(Math.log10(span / 3)), share = span / 3 / power;
+  return (share < 2 ? 1 : share < 5 ? 2 : 5) * power;
+}
 function range(key, low, high, least) { // grows at once, shrinks when half of it would do
   if (!(low <= high)) [low, high] = [-least, least];
   const mid = (low + high) / 2, half = Math.max((high - low) / 2, least);
@@ -93,7 +97,7 @@ function sketch(canvas, key, title, curves, least, head, seconds) {
   pen.fillStyle = "#57606a";
   pen.textBaseline = "middle";
   pen.textAlign = "right";
-  const step = nice((b - a) / 4), digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  const step = even(b - a), digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   for (let v = Math.ceil(a / step) * step; v <= b; v += step) {
     const up = Math.round(y(v)) + 0.5, level = Math.abs(v) < step / 1e3 ? 0 : v;
     pen.strokeStyle = level === 0 ? "#aab3bc" : "#e4e8ec";

@@ -49,7 +49,8 @@ def bandwidth_limitation(
     if specimen:
         words.append(specimen)
     modes = oil_column_modes(plant.machine, loaded=True)
-    near = min(modes, key=lambda mode: _octaves(mode.frequency, f[at]))
+    axis = transfer.axes[0]  # of columns as near as each other its own is named
+    near = min(modes, key=lambda mode: (round(_octaves(mode.frequency, f[at]), 2), mode.axis != axis))
     if _octaves(near.frequency, f[at]) < OIL_COLUMN_OCTAVES:
         words.append(f"near the oil column at {near.frequency:.3g} Hz ({near.axis})")
     if not specimen:

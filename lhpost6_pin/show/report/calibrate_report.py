@@ -108,7 +108,8 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     before = float(np.nanmax(calibration.misfit_before))
     limit = calibration.numbers.number("report.informed")
     note = f"predicted deviation below {limit:g} of the prior's"
-    differ = f"by more than {calibration.limit:g} predicted deviations"
+    material = calibration.numbers.number("report.material")
+    differ = f"by more than {calibration.limit:g} predicted deviations and {material:g} stated ones"
     good: Level = "good" if calibration.converged else "bad"
     fits: Level = "good" if after <= calibration.noise_alone else "attention"
     apart = len(contradictions(calibration))

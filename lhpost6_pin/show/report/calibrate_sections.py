@@ -52,11 +52,13 @@ def parameter_table(calibration: Calibration) -> Table:
     rows = []
     for i, parameter in enumerate(calibration.parameters):
         low, high = calibration.interval(i, PROBABILITY)
-        verdict = MARKS.get(verdict_on(calibration, i), verdict_on(calibration, i))
+        verdict = verdict_on(calibration, i)
+        hardly = verdict == "unchanged" and abs(deviations[i]) > calibration.limit
+        verdict_words = "hardly changed" if hardly else MARKS.get(verdict, verdict)
         rows.append(
             (
                 parameter.name,
-                f"{verdict} ({number(float(deviations[i]), 2)})",
+                f"{verdict_words} ({number(float(deviations[i]), 2)})",
                 _plain(parameter.value),
                 _plain(parameter.at(float(calibration.estimate[i]))),
                 f"{_plain(low)} to {_plain(high)}" if calibration.converged else "none",
@@ -74,10 +76,10 @@ def parameter_blocks(calibration: Calibration) -> list[Block]:
     how = (
         "At its bound: the limit of the fit, from its prior or from an unbuildable machine. "
         f"Changed: identifiable (predicted deviation below {informed:g} of the prior's), and more than "
-        f"{calibration.limit:g} predicted deviations and {material:g} prior deviations from nominal. Unchanged: "
-        "identifiable, and less. Not informed: the tests hardly narrow it, and where it moved it followed others. In "
-        "brackets: predicted deviations from nominal. A height is the mean over the components of its kind, which move "
-        "together."
+        f"{calibration.limit:g} predicted deviations and {material:g} prior deviations from nominal. Hardly changed: "
+        "less than the latter. Unchanged: identifiable, and less. Not informed: the tests hardly narrow it, and where "
+        "it moved it followed others. In brackets: predicted deviations from nominal. A height is the mean over the "
+        "components of its kind, which move together."
     )
     tables = (parameter_table(calibration), *ratio_tables(calibration))
     narrow = filter(None, [interval_summary(calibration)])

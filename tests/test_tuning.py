@@ -275,3 +275,12 @@ def test_noise_stays_within_the_limits_of_a_small_table():
     assert np.abs(less.displacement[:, 1]).max() == pytest.approx(share * 0.02, rel=1e-12)
     ratio = less.acceleration[:, 1] @ usual.acceleration[:, 1] / (usual.acceleration[:, 1] @ usual.acceleration[:, 1])
     assert np.allclose(less.velocity[:, 1], ratio * usual.velocity[:, 1], rtol=1e-12, atol=0.0)
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_of_two_axes_alike_the_own_oil_column_limits_the_band(axis):
+    """Both columns of the biaxial table are at 21.35 Hz; those of x had been named for y."""
+    f = np.arange(1, 400) / 8.0
+    transfer = Transfer(f, np.full((len(f), 1, 1), 0.5, complex), np.ones((len(f), 1)), (axis,))
+    found = bandwidth_limitation(make_plant(load_machine("biaxial")), transfer, (0.125, 21.0), 3.0, 0.8, 33.0)
+    assert f"near the oil column at 21.4 Hz ({axis})" in found.summary

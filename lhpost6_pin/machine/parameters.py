@@ -34,8 +34,8 @@ log = logging.getLogger(__name__)
 _GROUPS = ("kind", "component", "floor", "accelerometer", "estimates")
 """Sections that hold named sub-sections; the sub-section's name is the path's first part."""
 
-_FAR = 3.0
-"""Decades from what is stated beyond which a number without unit is doubted. Judgement, not physics."""
+_FAR = 2.9
+"""Decades from what is stated beyond which a number without unit is doubted: mm for m are three. Judgement, not physics."""
 
 _PREFIXED = ("accelerometer", "estimates")
 """Those whose sub-sections keep the group's name in front of theirs."""

@@ -35,7 +35,7 @@ _GROUPS = ("kind", "component", "floor", "accelerometer", "estimates")
 """Sections that hold named sub-sections; the sub-section's name is the path's first part."""
 
 _FAR = 2.9
-"""Decades from what is stated beyond which a number without unit is doubted: mm for m are three. Judgement, not physics."""
+"""Decades from what is stated beyond which a number without unit is doubted: mm for m are three. Judgement."""
 
 _PREFIXED = ("accelerometer", "estimates")
 """Those whose sub-sections keep the group's name in front of theirs."""

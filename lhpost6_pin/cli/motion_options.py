@@ -79,8 +79,8 @@ FileRotations = Annotated[
 
 log = logging.getLogger(__name__)
 
-_OF_MOTION = ("displacement", "velocity", "acceleration")
-_SMALL = 0.02  # share of what the table reaches in these, below which a motion is likely in a wrong unit
+_SMALL = 0.02
+"""Share of what the axes reach, below which a motion is likely in a wrong unit."""
 
 
 @dataclass(frozen=True)
@@ -150,8 +150,7 @@ class MotionOptions:
             rate=float(SAMPLE_RATE),
         )
         if not beyond:
-            use = check_motion_limits(make_plant(table), target).utilisation
-            share = max(one for quantity in _OF_MOTION for one in use[quantity].values())
+            share = check_motion_limits(make_plant(table), target).of_axes
             if share < _SMALL:
                 log.warning(
                     "%s reaches at most %.2g %% of the table's displacement, velocity or acceleration: little beyond "

@@ -216,7 +216,7 @@ class _Search:
         """A size far from what is required, of all forces that are not settled, where no hypothesis holds.
 
         Not where the forces, brought to the size required, would hold much friction: what the projection leaves of it
-        is not small beside inertia then. With it they are still not a small part of what is required.
+        is not small beside inertia then. Forces that are far too small with all friction are doubted all the same.
         """
         ratio, explained = self._regression(balance)
         limit, near = self.numbers.number("force_unit.factor"), self.numbers.number("balance.near")

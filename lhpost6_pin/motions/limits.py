@@ -104,6 +104,11 @@ class LimitsSummary:
         rows = [(p.quantity, p.name, p.utilisation) for p in self.peaks if p.decides]
         return max(rows, key=lambda item: item[2])
 
+    @property
+    def of_axes(self) -> float:
+        """Largest share of an axis's displacement, velocity or acceleration."""
+        return max(share for quantity in _QUANTITIES for share in self.utilisation[quantity].values())
+
 
 def check_limits(
     target: Target,

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..core.files import models_folder
-from ..data.records import is_measured
+from ..data.channels import MOTION
+from ..data.records import is_measured, require
 from ..data.sensors import SensorSet
 from ..data.signals import Band
 from ..effects.registry import law_of, states_of
@@ -122,6 +123,8 @@ def start_of_record(plant: Plant, record: xr.Dataset, sensors: SensorSet | None)
 
     Raises RecordError for a record without platen motion, or with a channel of it that is not finite.
     """
+    if sensors is None:
+        require(record, *MOTION)
     cutoff = _number("comparison.cutoff")
     band = Band(high=cutoff, order=int(_number("comparison.order")))
     return estimate_start(plant, prepare_test(plant, record, sensors, AS_RECORDED._replace(band=band)), cutoff)

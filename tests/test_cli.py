@@ -555,6 +555,18 @@ def test_a_view_mounts_what_the_record_states_and_warns_where_it_cannot(lhpost6,
         sizes[name] = (tmp_path / f"{name}.html").stat().st_size
     assert sizes["stated"] > sizes["old"]  # the pendulum's shapes
     assert abs(sizes["moved"] - sizes["old"]) < 1000
+    caplog.clear()
+    lhpost6("view", "stated.nc", "--specimen", "pendulum", "--locked", "--export", "elsewhere.html")
+    assert "--specimen-at 1,0.5,0 mounts it there" in caplog.text
+
+
+def test_a_record_made_with_a_program_states_its_place_and_how_to_mount_it(lhpost6, tmp_path):
+    """Mounted at C as asked, its overturning moment had been wrong by a factor of a thousand."""
+    record = load_record(PRACTICE).assign_attrs(specimen="Tank", specimen_position=np.array([2.0, 1.0, 0.0]))
+    save_record(record, tmp_path / "tank.nc")
+    assert refused(lhpost6("decompose", "tank.nc"), "mount it with --specimen FILE.py:NAME --specimen-at 2,1,0")
+    (tmp_path / "tank.py").write_text("class Tank:\n    def init(self, base, gravity): ...\n    def step(self, *a): ...\n")
+    assert refused(lhpost6("panel", "--no-open", "--specimen", "tank.py:Tank"), "takes no program", "--server")
 
 
 def test_decompose_on_another_machine_is_refused(lhpost6):

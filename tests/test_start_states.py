@@ -296,6 +296,15 @@ def test_offsets_of_load_cells_are_not_called_held_friction():
     assert np.all(np.abs(mean[:2]) < 3.0 * np.array([3.6e3, 2.9e3]))  # [N] deviations by offsets within their ranges
 
 
+def test_a_delay_that_a_test_does_not_determine_is_not_removed():
+    """In a motion a tenth as large the accelerometer was "24.6 ms late", of sensors without any skew."""
+    exact = {"seed": 1, "errors": False, "tests": ("TX",), "scale": 0.1}
+    (record,) = simulate_campaign(load_machine(), load_controller("lhpost6"), load_sensors(), **exact).records
+    found = decompose_record(load_machine(), record)
+    assert all(abs(one.delay) < 3e-4 for one in found.delays.values())  # as the sensors' ranges allow
+    assert np.all(find_agreement(found).noise_ratio[0] < 1.1)
+
+
 def test_a_long_rest_after_a_motion_does_not_raise_the_predicted_noise(run):
     """A second draw of noise moves the platen at rest more than one does: friction would creep away in it."""
     still = run.isel(time=[-1] * (40 * SAMPLE_RATE))

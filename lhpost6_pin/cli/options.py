@@ -193,24 +193,25 @@ class MountOptions:
     def onto_for(self, table: "Machine", records: Sequence["xr.Dataset"]) -> "Machine":
         """As `onto`; without --specimen the machine with the specimen that all records state, as far as they do.
 
-        Records that state another specimen, and simulated ones of a table whose moving parts are described otherwise,
-        are a warning. Raises RecordError for records with different specimens, or a stated one whose file is not there.
+        Records that state other mountings or moving parts are a warning. Raises RecordError for records with different
+        specimens, or a stated one whose file is not there.
         """
         for bodies in sorted({_bodies(r) for r in records if r.attrs.get("kind") == "simulated"} - {table.bodies}):
             log.warning(
-                "records were made with moving parts of the legs as bodies = %s; %s has bodies = %s, whose inertia "
-                "differs: --bodies %s, or that word in the machine file, makes them alike",
-                bodies, table.name, table.bodies, bodies,
+                "records were made with moving parts of the legs as bodies = %s; %s has %s, whose inertia differs: "
+                "--bodies %s, or that word in the machine file, mends it", bodies, table.name, table.bodies, bodies,
             )  # fmt: skip
         if self.specimen is not None or not records:
+            from ..machine.recorded_specimen import mounting_doubts
+
             mounted = self.onto(table)
-            for made in sorted({str(r.attrs.get("specimen", mounted.mounted)) for r in records} - {mounted.mounted}):
-                log.warning("the record states specimen %s, --specimen mounts %s", made, mounted.mounted)
+            for doubt in mounting_doubts(mounted.specimen, [r.attrs for r in records]):
+                log.warning("%s", doubt)
             return mounted
         by_specimen = {_specimen_words(record.attrs): record for record in records}
-        if len(by_specimen) > 1:
+        record, *others = by_specimen.values()
+        if others:
             raise RecordError(f"the records were made with different specimens: {'; '.join(by_specimen)}")
-        (record,) = by_specimen.values()
         self.onto(table)  # raises for --locked without --specimen
         if "specimen_file" not in record.attrs:  # its place is not stated: what needs it says so
             return table
@@ -250,8 +251,7 @@ class ExchangeOptions:
     exchange: Annotated[
         str,
         typer.Option(
-            help="A specimen that is a program exchanges motion and wrench once a controller sample, or at every model "
-            "step.",
+            help="A specimen that is a program exchanges motion and wrench once a controller sample, or every step.",
             autocompletion=completing(lambda: EXCHANGES),
         ),
     ] = "sample"

@@ -53,11 +53,17 @@ def panel(
 
     from ..data.sensors import load_sensors
     from ..interfaces.link import make_faults
+    from ..machine.user_specimen import UserSpecimen
     from ..panel.session import Options, Session
     from ..panel.web import PanelServer
     from ..panel.worker import Setup, panel_numbers
 
     table = machine.load(valves)
+    if isinstance(table.specimen, UserSpecimen):
+        raise ParameterError(
+            f"--specimen {table.specimen.source}: the panel's own plant takes no program; start it with "
+            "`lhpost6 serve --mode real-time` and this specimen, and give its address with --server"
+        )
     settings = find_settings(controller, table)
     there, known = _address(server), load_sensors(sensors) if sensors else None
     if not 0.0 < pace <= 1.0:

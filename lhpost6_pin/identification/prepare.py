@@ -4,8 +4,7 @@ Decomposition, validation, calibration and discovery share this road. They diffe
 groups of channels are removed beforehand, and from which tests they are estimated.
 
     AS_RECORDED   none
-    EACH_TEST     all that redundant channels show, test by test                                            (decompose)
-    SIGNIFICANT   those of the whole campaign that exceed their standard errors                              (validate)
+    SIGNIFICANT   those of the records given that exceed their standard errors                  (decompose and validate)
     CALIBRATION   those of the whole campaign, except of the struts' gas, where loss of heat would be mistaken for a
                   delay; actuator lengths are excluded from the motion, since the geometry behind them is
                   calibrated                                                                  (calibrate and discover)
@@ -33,7 +32,7 @@ from ..mechanics.plant import Plant
 from ..mechanics.pose import PlatenMotion, leg_displacements
 from ..mechanics.strokes import stroke_ends
 
-__all__ = ["AS_RECORDED", "CALIBRATION", "EACH_TEST", "HALF_PLAY", "ROD_LENGTH", "SIGNIFICANT", "MeasuredTest"]
+__all__ = ["AS_RECORDED", "CALIBRATION", "HALF_PLAY", "ROD_LENGTH", "SIGNIFICANT", "MeasuredTest"]
 __all__ += ["Policy", "actuator_forces", "align_records", "chamber_pressures", "find_delays", "oil_forces"]
 __all__ += ["check_usable", "prepare_noisier", "prepare_test", "source_of", "warn_of_skews"]
 
@@ -62,7 +61,6 @@ ROD_LENGTH, HALF_PLAY = "rod_displacement", "half_play"
 their sensors, NaN for others; and its attribute: by how much each is loose, to either side [m]."""
 
 AS_RECORDED = Policy(align=False)
-EACH_TEST = Policy(align=True)
 SIGNIFICANT = Policy(align=True, significance=3.0)
 CALIBRATION = Policy(align=True, as_recorded=("strut_pressure",), lengths=False, shares=True)
 

@@ -186,7 +186,11 @@ class Machine(Structure):
         """Raise RecordError if `record` was made with a specimen and this table is bare."""
         carried = str(attrs.get("specimen", "none"))
         if carried != "none" and self.specimen is None:
-            raise RecordError(f"{record} was made with specimen {carried!r} on the table; mount it with --specimen")
+            how = "mount it with --specimen"
+            if "specimen_file" not in attrs and "specimen_position" in attrs:  # a program
+                at = ",".join(f"{x:g}" for x in attrs["specimen_position"])
+                how += f" FILE.py:NAME --specimen-at {at}; calibrate and discover take tests without it alone"
+            raise RecordError(f"{record} was made with specimen {carried!r} on the table; {how}")
 
     def with_specimen(
         self,

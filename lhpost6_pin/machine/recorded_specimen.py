@@ -1,6 +1,6 @@
 """The specimen of a test, as attributes of its record: name, file, place, and whether its joints were locked."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +11,7 @@ from .components import Vec3
 from .specimen import Specimen, find_specimen
 from .user_specimen import UserSpecimen
 
-__all__ = ["Mounting", "recorded_mounting", "specimen_facts"]
+__all__ = ["Mounting", "mounting_doubts", "recorded_mounting", "specimen_facts"]
 
 
 class Mounting(NamedTuple):
@@ -26,20 +26,34 @@ class Mounting(NamedTuple):
 def specimen_facts(specimen: Specimen | None) -> dict[str, Any]:
     """Attributes of a record made with a specimen; `specimen` is `none` for a bare table.
 
-    Of a specimen in Python the name alone: a record that is read must not run a program.
+    Of a specimen in Python without its file: a record that is read must not run a program.
     """
     if specimen is None:
         return {"specimen": "none"}
-    if isinstance(specimen, UserSpecimen):
-        return {"specimen": specimen.name}
-    path = specimen.file.resolve()
-    return {
-        "specimen": specimen.name,
-        "specimen_file": specimen.name if _is_shipped(path, specimen.name) else str(path),
+    place = {
         "specimen_position": np.array(specimen.position, float),  # of its root from C, platen axes [m]
         "specimen_rpy": np.array(specimen.rpy, float),  # [rad]
-        "specimen_locked": int(specimen.locked),
     }
+    if isinstance(specimen, UserSpecimen):
+        return {"specimen": specimen.name, **place}
+    path = specimen.file.resolve()
+    file = specimen.name if _is_shipped(path, specimen.name) else str(path)
+    return {"specimen": specimen.name, "specimen_file": file, **place, "specimen_locked": int(specimen.locked)}
+
+
+def mounting_doubts(specimen: Specimen | None, records: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Sentences on what attributes of records state of their specimen otherwise than it is mounted, each once."""
+    name = specimen.name if specimen else "none"
+    at = np.array(specimen.position if specimen else (0.0, 0.0, 0.0), float)
+    found: dict[str, None] = {}
+    for attrs in records:
+        made, place = str(attrs.get("specimen", name)), np.ravel(attrs.get("specimen_position", at))
+        if made != name:
+            found[f"the record states specimen {made}, --specimen mounts {name}"] = None
+        elif place.shape == at.shape and not np.allclose(place, at):
+            stated = ",".join(f"{x:g}" for x in place)
+            found[f"the record states {name} at {stated} m from C: --specimen-at {stated} mounts it there"] = None
+    return list(found)
 
 
 def recorded_mounting(attrs: Mapping[str, Any], record: str) -> Mounting | None:

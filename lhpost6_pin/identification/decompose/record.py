@@ -33,7 +33,7 @@ from ..inverse_dynamics import Decomposition, inverse_dynamics
 from ..known_slip import UNKNOWN_SLIP, slip_summary
 from ..prepare import (
     AS_RECORDED,
-    EACH_TEST,
+    SIGNIFICANT,
     MeasuredTest,
     actuator_forces,
     check_usable,
@@ -137,7 +137,7 @@ def decompose_record(
     comparison = ComparisonBand(band, numbers.number("comparison.edge"))
     policy = AS_RECORDED
     if is_measured(record):
-        sensors, policy = sensors or find_sensors(machine, [record]), EACH_TEST if align else AS_RECORDED
+        sensors, policy = sensors or find_sensors(machine, [record]), SIGNIFICANT if align else AS_RECORDED
     else:
         require(record, *MOTION)
         sensors = None

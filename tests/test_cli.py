@@ -565,7 +565,10 @@ def test_a_record_made_with_a_program_states_its_place_and_how_to_mount_it(lhpos
     record = load_record(PRACTICE).assign_attrs(specimen="Tank", specimen_position=np.array([2.0, 1.0, 0.0]))
     save_record(record, tmp_path / "tank.nc")
     assert refused(lhpost6("decompose", "tank.nc"), "mount it with --specimen FILE.py:NAME --specimen-at 2,1,0")
-    (tmp_path / "tank.py").write_text("class Tank:\n    def init(self, base, gravity): ...\n    def step(self, *a): ...\n")
+    program = "import pinocchio as pin\nclass Tank:\n    inertia = pin.Inertia.Zero()\n"
+    program += "    def init(self, base, gravity): return None, pin.Force.Zero()\n"
+    program += "    def step(self, memory, base, dt): return None, pin.Force.Zero()\n"
+    (tmp_path / "tank.py").write_text(program)
     assert refused(lhpost6("panel", "--no-open", "--specimen", "tank.py:Tank"), "takes no program", "--server")
 
 

@@ -15,7 +15,7 @@ from lhpost6_pin.mechanics.actuator_forces import rest_forces, unit_shares
 from lhpost6_pin.mechanics.capacity import capacity_table, flow_readings, payload_table
 from lhpost6_pin.mechanics.equilibrium import actuator_speeds
 from lhpost6_pin.mechanics.linearize import linearize, oil_column_modes
-from lhpost6_pin.mechanics.motion_demands import make_motion_check
+from lhpost6_pin.mechanics.motion_demands import MotionDemands
 from lhpost6_pin.mechanics.plant import make_plant
 from lhpost6_pin.mechanics.pose import leg_displacements
 from lhpost6_pin.mechanics.rigid_body import platen_inertia
@@ -142,7 +142,7 @@ def test_actuator_check_finds_what_the_valves_cannot_feed(plant):
 
 
 def test_shares_of_valves_and_strokes_are_rates_over_speeds_and_elongations_over_strokes(plant):
-    check = make_motion_check(plant)
+    check = MotionDemands(plant)
     velocity, still = np.zeros((2, 6)), np.zeros((2, 6))
     velocity[0, 2], velocity[1, 2] = 0.1, -0.1
     found = {demand.quantity: demand for demand in check(still, velocity, still)}

@@ -20,7 +20,7 @@ from lhpost6_pin.mechanics.actuator_forces import axis_capacity, force_range, re
 from lhpost6_pin.mechanics.capacity import ALL_VALVES
 from lhpost6_pin.mechanics.equilibrium import find_equilibrium
 from lhpost6_pin.mechanics.instant import platen_pose_at, required_wrench_at, wrench_at
-from lhpost6_pin.mechanics.motion_demands import make_motion_check
+from lhpost6_pin.mechanics.motion_demands import MotionDemands
 from lhpost6_pin.mechanics.payload import lock_joints, with_payload
 from lhpost6_pin.mechanics.performance import table_performance
 from lhpost6_pin.mechanics.plant import make_plant
@@ -123,7 +123,7 @@ def test_the_peak_of_unloading_is_the_force_lost_that_its_share_is_of():
     plant, still = plant_named("lhpost6"), np.zeros((2, 6))
     rise = still.copy()
     rise[:, 2] = [-5.0, 0.0]
-    found = {demand.quantity: demand for demand in make_motion_check(plant)(still, still, rise)}
+    found = {demand.quantity: demand for demand in MotionDemands(plant)(still, still, rise)}
     span, rest = force_range(plant), rest_forces(plant)
     at_rest = (span.middle + span.half * rest.share[0])[4:]  # of the vertical actuators
     lost = found["actuator unloading"]
@@ -330,7 +330,7 @@ def test_a_tall_specimen_is_judged_by_the_moments_that_the_reaction_mass_bears()
     motion[2, 1, 0] = 5.0  # m/s2 along x
 
     def demand(one):
-        found = make_motion_check(one)(*motion)
+        found = MotionDemands(one)(*motion)
         return next(d for d in found if d.quantity == "reaction mass moment")
 
     bare, loaded = demand(plant), demand(tall)

@@ -90,6 +90,7 @@ def _comparable(files: Sequence[Path], wrong: Collection[str]) -> "Campaign":
     """
     from ..data.campaign import Campaign, SkippedTest
     from ..data.records import load_record
+    from ..data.served_samples import part_compared
     from ..identification.calibration import usable_tests
 
     records, skipped = [], []
@@ -102,7 +103,7 @@ def _comparable(files: Sequence[Path], wrong: Collection[str]) -> "Campaign":
             skipped.append(SkippedTest(path.stem, str(error)))
             continue
         record.attrs.setdefault("test", path.stem)
-        records.append(record)
+        records.append(part_compared(record))
     if not records:
         raise RecordError(skipped[0].why)
     whole = Campaign(files[0].parent.name, tuple(records), tuple(skipped))

@@ -62,7 +62,8 @@ def wrong_forces(record: xr.Dataset, machine: Machine) -> list[RecordFinding]:
     if plant.coupled is not None:
         return []  # its wrench is not part of the compiled equations
     wrong: dict[str, list[_Wrong]] = {}
-    for one in _Search(record, lock_joints(plant)).run():
+    search = _Search(record, lock_joints(plant))
+    for one in search.run():
         wrong.setdefault(_exchanged(one.factor), []).append(one)
     turned = [
         RecordFinding(
@@ -72,22 +73,7 @@ def wrong_forces(record: xr.Dataset, machine: Machine) -> list[RecordFinding]:
         for name in one.actuators
     ]
     named = {name for each in wrong.values() for one in each for name in one.actuators}
-    return turned + [_finding(units, each) for units, each in wrong.items()] + _beyond(record, plant, named)
-
-
-def _beyond(record: xr.Dataset, plant: Plant, named: Collection[str]) -> list[RecordFinding]:
-    """A warning for each actuator, none of those `named` already, whose force is far beyond what it can give."""
-    labels, span, found = list(map(str, record["actuator"].values)), force_range(plant), []
-    most = np.maximum(np.abs(span.least), span.most)
-    for name, able in zip(plant.machine.actuator_names, most, strict=True):
-        force = columns_of(record["actuator_force"])[:, labels.index(name)]
-        share = float(np.nanmax(np.abs(force), initial=0.0) / able)
-        if name not in named and share > rest_numbers().number("force_unit.beyond"):
-            sample = int(np.nanargmax(np.abs(force)))
-            what = f"reaches {share * able:.4g} N, {share:.3g} times what the actuator can give"
-            remedy = "check its unit in the channel map, or area and supply pressure of the machine file"
-            found.append(RecordFinding("warning", f"actuator_force[{name}]", sample, what, remedy))
-    return found
+    return turned + [_finding(units, each) for units, each in wrong.items()] + search.beyond(named)
 
 
 class _Search:
@@ -100,7 +86,7 @@ class _Search:
         labels = list(map(str, record["actuator"].values))
         self.force = columns_of(record["actuator_force"])[:, [labels.index(name) for name in self.names]]
         self.loaded = plant.machine.specimen is None and str(record.attrs.get("specimen", "none")) != "none"
-        span = force_range(plant)
+        span = self.span = force_range(plant)
         due = span.middle + rest_forces(plant).share[0] * span.half
         self.held = self.force.mean(axis=0) / np.where(due == 0.0, np.inf, due)  # mean forces over those of rest
         self.factor = np.ones(len(self.names))
@@ -123,6 +109,19 @@ class _Search:
                     self.settled |= static.judged
         for group in groups:
             yield from self._judge([b.of(group) for b in in_motion])
+
+    def beyond(self, named: Collection[str]) -> list[RecordFinding]:
+        """A warning for each actuator, none of those `named` already, whose force is far beyond what it can give."""
+        able, found = np.maximum(np.abs(self.span.least), self.span.most), []
+        peak = np.nan_to_num(np.abs(self.force), posinf=np.inf)
+        for i in np.flatnonzero(peak.max(axis=0, initial=0.0) > self.numbers.number("force_unit.beyond") * able):
+            if (name := str(self.names[i])) not in named:
+                sample = int(peak[:, i].argmax())
+                share = peak[sample, i] / able[i]
+                what = f"reaches {peak[sample, i]:.4g} N, {share:.3g} times what the actuator can give"
+                remedy = "check its unit in the channel map, or area and supply pressure of the machine file"
+                found.append(RecordFinding("warning", f"actuator_force[{name}]", sample, what, remedy))
+        return found
 
     def _confirm(self, balance: ForceBalance) -> None:
         """Settle the forces without which a balance that holds would be much worse."""

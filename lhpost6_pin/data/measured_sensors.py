@@ -157,10 +157,11 @@ def measured_sensors(
     levels = levels or noise_levels(records, numbers)
     if levels.hidden:
         raise RecordError(f"no rest, and tests in motion hide the noise of {', '.join(levels.hidden)}")
-    longest = max(record.sizes["time"] for record in records)
-    if not levels.channels and longest < levels.rate:
-        raise RecordError(f"{longest} samples are too few to show noise: record two seconds of rest before each test")
     if not levels.channels:
+        longest = max(record.sizes["time"] for record in records)
+        if longest < levels.rate:
+            remedy = "record two seconds of rest before each test"
+            raise RecordError(f"{longest} samples are too few to show noise: {remedy}")
         why = f"no channel shows any noise at {levels.rate:g} Hz, the rate of the records"
         raise RecordError(f"{why}: it is too slow, or they are simulated without noise and need no sensors file")
     found = {f"sampling.{key}": quantity for key, quantity in _sampling(levels, numbers).items()}

@@ -19,7 +19,7 @@ from .components import Actuator, Floor, Hydraulics, Limits, Platen, PowerSupply
 from .library import effect_entry, make_named_effect, size_of
 from .machine_checks import check_actuator, check_machine, check_names
 from .parameters import EffectEntry, Parameters, load_parameters, override_parameters
-from .recorded_specimen import recorded_mounting
+from .recorded_specimen import place_words, recorded_mounting
 from .schema import build_section
 from .specimen import Specimen, find_specimen
 from .standard_effects import standard_effects
@@ -188,7 +188,7 @@ class Machine(Structure):
         if carried != "none" and self.specimen is None:
             how = "mount it with --specimen"
             if "specimen_file" not in attrs and "specimen_position" in attrs:  # a program
-                at = ",".join(f"{x:g}" for x in attrs["specimen_position"])
+                at = place_words(attrs["specimen_position"])
                 how += f" FILE.py:NAME --specimen-at {at}; calibrate and discover take tests without it alone"
             raise RecordError(f"{record} was made with specimen {carried!r} on the table; {how}")
 

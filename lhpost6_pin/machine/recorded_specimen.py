@@ -1,6 +1,6 @@
 """The specimen of a test, as attributes of its record: name, file, place, and whether its joints were locked."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +11,7 @@ from .components import Vec3
 from .specimen import Specimen, find_specimen
 from .user_specimen import UserSpecimen
 
-__all__ = ["Mounting", "mounting_doubts", "recorded_mounting", "specimen_facts"]
+__all__ = ["Mounting", "mounting_doubts", "place_words", "recorded_mounting", "specimen_facts"]
 
 
 class Mounting(NamedTuple):
@@ -41,6 +41,11 @@ def specimen_facts(specimen: Specimen | None) -> dict[str, Any]:
     return {"specimen": specimen.name, "specimen_file": file, **place, "specimen_locked": int(specimen.locked)}
 
 
+def place_words(place: Iterable[float]) -> str:
+    """A place [m] as `--specimen-at` takes it."""
+    return ",".join(f"{x:g}" for x in place)
+
+
 def mounting_doubts(specimen: Specimen | None, records: Sequence[Mapping[str, Any]]) -> list[str]:
     """Sentences on what attributes of records state of their specimen otherwise than it is mounted, each once."""
     name = specimen.name if specimen else "none"
@@ -51,7 +56,7 @@ def mounting_doubts(specimen: Specimen | None, records: Sequence[Mapping[str, An
         if made != name:
             found[f"the record states specimen {made}, --specimen mounts {name}"] = None
         elif place.shape == at.shape and not np.allclose(place, at):
-            stated = ",".join(f"{x:g}" for x in place)
+            stated = place_words(place)
             found[f"the record states {name} at {stated} m from C: --specimen-at {stated} mounts it there"] = None
     return list(found)
 

@@ -7,8 +7,6 @@ strength: reaction mass, platen, tilt of the pistons, payload. Beside them the r
 over the capacity along this axis alone, which does not decide: axes share the actuators.
 """
 
-from typing import Protocol
-
 import numpy as np
 
 from ..core.arrays import Array
@@ -23,14 +21,21 @@ from .plant import Plant
 from .pose import PlatenMotion, leg_displacements, rotation
 from .specimen_joints import specimen_mass
 
-__all__ = ["DemandCheck", "make_motion_check"]
+__all__ = ["MotionDemands"]
 
 OVERTURNING = ("roll", "pitch")
 OF_SPEED = "of the unloaded velocity of its valves"
 
 
-class DemandCheck(Protocol):
-    """A `MotionCheck`, also of motion that was achieved."""
+class MotionDemands:
+    """The demands of motions on a plant; called as a `MotionCheck`, and so of motion that was achieved."""
+
+    def __init__(self, plant: Plant) -> None:
+        """Raise SimulationError or OutOfRangeError if the actuators cannot hold what is mounted at rest."""
+        self._plant, self._full = plant, actuator_speeds(plant)
+        self._strength, self._rest = stated_strength(plant.machine.parameters), rest_forces(plant)
+        _refuse_unheld(plant, self._rest.share[0])
+        self._along, self._span = axis_capacity(plant), force_range(plant)
 
     def __call__(
         self,
@@ -41,38 +46,18 @@ class DemandCheck(Protocol):
         achieved: bool = False,
         specimen: Array | None = None,
     ) -> list[Demand]:
-        """Demands of a motion, (n, 6) each."""
-        ...
+        """Return the demands of a motion: displacement, velocity, acceleration of C and Euler angles, (n, 6) each.
 
-
-def make_motion_check(plant: Plant) -> DemandCheck:
-    """Return the demands of a motion (displacement, velocity, acceleration of C and Euler angles, (n, 6) each).
-
-    Valves can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load; of strokes
-    limits.stroke_reserve is kept for overshoot. In a motion that was `achieved` these have taken what they needed:
-    there is no reserve. The wrench `specimen` (n, 6) of what is mounted, on the platen at B in platen axes [N, N m],
-    is that of its response where it is known; without it the specimen is one rigid body.
-    Raises SimulationError or OutOfRangeError if the actuators cannot hold what is mounted at rest.
-    """
-    machine = plant.machine
-    full = actuator_speeds(plant)
-    strokes, names = np.array([a.stroke for a in machine.actuators]), machine.actuator_names
-    strength, rest = stated_strength(machine.parameters), rest_forces(plant)
-    _refuse_unheld(plant, rest.share[0])
-    along, span = axis_capacity(plant), force_range(plant)
-    single = np.array([a.area_b is None for a in machine.actuators])
-
-    def check(
-        displacement: Array,
-        velocity: Array,
-        acceleration: Array,
-        *,
-        achieved: bool = False,
-        specimen: Array | None = None,
-    ) -> list[Demand]:
-        kept = machine.limits
+        Valves can feed the steady unloaded speed at full spool, less limits.valve_reserve for feedback and load; of
+        strokes limits.stroke_reserve is kept for overshoot. In a motion that was `achieved` these have taken what they
+        needed: there is no reserve. The wrench `specimen` (n, 6) of what is mounted, on the platen at B in platen axes
+        [N, N m], is that of its response where it is known; without it the specimen is one rigid body.
+        """
+        plant, rest, span, kept = self._plant, self._rest, self._span, self._plant.machine.limits
+        strokes, names = np.array([a.stroke for a in plant.machine.actuators]), plant.machine.actuator_names
+        single = np.array([a.area_b is None for a in plant.machine.actuators])
         flow, travel = (0.0, 0.0) if achieved else (kept.valve_reserve, kept.stroke_reserve)
-        speeds, usable = (1.0 - flow) * full, (1.0 - travel) * strokes
+        speeds, usable = (1.0 - flow) * self._full, (1.0 - travel) * strokes
         legs, rate = leg_displacements(plant, displacement, velocity)
         moved, rate = legs[:, : plant.spools], rate[:, : plant.spools]
         fed = np.where(rate >= 0.0, rate / speeds[:, 0], -rate / speeds[:, 1])
@@ -94,10 +79,8 @@ def make_motion_check(plant: Plant) -> DemandCheck:
                 found.append(Demand(quantity, these, pull[:, some], of, less[:, some], "N"))
         in_space = np.einsum("nij,nj->ni", needed.turn, needed.wrench[:, :3])
         wrench = needed.wrench - rest.wrench
-        found += _on_parts(plant, strength, displacement, in_space, wrench[:, 3:])
-        return [*found, *_along_axes(plant, wrench_at_bearings(plant, wrench), along)]
-
-    return check
+        found += _on_parts(plant, self._strength, displacement, in_space, wrench[:, 3:])
+        return [*found, *_along_axes(plant, wrench_at_bearings(plant, wrench), self._along)]
 
 
 def _refuse_unheld(plant: Plant, share: Array) -> None:

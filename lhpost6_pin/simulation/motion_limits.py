@@ -23,7 +23,7 @@ from ..machine.strength import stated_strength
 from ..machine.structure import FLOW_READINGS
 from ..mechanics.capacity import with_all_valves
 from ..mechanics.interface_wrench import from_interface
-from ..mechanics.motion_demands import make_motion_check
+from ..mechanics.motion_demands import MotionDemands
 from ..mechanics.plant import Plant, make_plant
 from ..mechanics.pose import PlatenMotion
 from ..motions import LimitsSummary, MotionLimits, Peak, Reference, Target, check_limits, largest_scale, limit_peaks
@@ -53,7 +53,7 @@ def check_motion_limits(
     refuse_blocked_axes(plant, target)
     bounds = _axis_limits(plant)
     try:
-        return check_limits(target, bounds, make_motion_check(plant), units, size)
+        return check_limits(target, bounds, MotionDemands(plant), units, size)
     except OutOfRangeError as error:
         if not remedies or FLOW not in error.exceeded:
             raise
@@ -102,7 +102,7 @@ def refuse_blocked_axes(plant: Plant, target: Target) -> None:
 
 def fitting_scale(plant: Plant, target: Target) -> float:
     """Largest scale of the target's motion within all limits."""
-    return largest_scale(target, _axis_limits(plant), make_motion_check(plant))
+    return largest_scale(target, _axis_limits(plant), MotionDemands(plant))
 
 
 class Judgement(NamedTuple):
@@ -115,13 +115,13 @@ class Judgement(NamedTuple):
 def judge_motion(
     plant: Plant, motion: PlatenMotion, target: Target | None = None, specimen: Array | None = None
 ) -> Judgement:
-    """Demands of an achieved motion on all limits, none refused; raises as `make_motion_check` does.
+    """Demands of an achieved motion on all limits, none refused; raises as `MotionDemands` does.
 
     specimen (n, 6): its wrench on the platen at B in platen axes [N, N m] in this motion; without it the specimen is
     one rigid body, as it is of the target. Limits are the full ones; the scale at which the target fits keeps the
     reserves of valve flow, strokes and displacements.
     """
-    bounds, check = _axis_limits(plant), make_motion_check(plant)
+    bounds, check = _axis_limits(plant), MotionDemands(plant)
     fits = None if target is None else largest_scale(target, bounds, check)
     return Judgement(
         limit_peaks(motion, replace(bounds, reserve=0.0), partial(check, achieved=True, specimen=specimen)), fits

@@ -313,6 +313,7 @@ def test_an_over_range_motion_is_refused_with_the_scale_that_fits_and_run_if_ins
         (("sine", "triangle"), ("one motion at a time",)),
         (("sine", "--set", "amplitude"), ("--set amplitude", "key=value")),
         (("sine", "--set", "colour=red"), ("no option 'colour'", "amplitude")),
+        (("sine", "--set", "frequency=2"), ("no option 'frequency'", "period = 1 / frequency")),
         (("sine", "--set", "amplitude=large"), ("sine", "large")),
         (("sine", "--set", "amplitude=nan"), ("sine", "nan")),
         (("sine", "--axes", "q"), ("no axis 'q'",)),

@@ -150,7 +150,8 @@ def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> Ground
         raise MotionError(entry.request)
     unknown = sorted(set(options) - set(entry.options))
     if unknown:
-        raise MotionError(f"{name}: no option {unknown[0]!r}; {instead_of(unknown[0], entry.options)}")
+        turned = "give period = 1 / frequency, in s; " * ({unknown[0], *entry.options} >= {"frequency", "period"})
+        raise MotionError(f"{name}: no option {unknown[0]!r}; {turned}{instead_of(unknown[0], entry.options)}")
     index, tests = _tables()
     if entry.kind == "record":
         record = index["records"][entry.name]

@@ -173,7 +173,7 @@ def make_target(
     if max(span / motion.time_step, span * rate) > _MOST:
         raise MotionError(
             f"{motion.name}: {span:g} s with a time step of {motion.time_step:g} s are more than {_MOST} samples; "
-            "correct the time step or the size that sets its length, or cut a window"
+            "correct the time step or the size that sets its length (a number without a unit is in SI), or cut a window"
         )
     # both the record's first sample and the period fall on samples of the target
     ends = _multiple(round(memory / motion.time_step) + 1, step.denominator)

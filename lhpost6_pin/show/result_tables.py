@@ -30,6 +30,7 @@ from .report.friction_section import friction_table
 from .report.interface_section import interface_table
 from .report.iterate_report import iterate_verdict, iteration_tables, target_demands
 from .report.page import Table
+from .report.scales import axis_scale, shown_as
 from .report.sine_report import sine_table, sine_verdict
 from .report.tune_report import losses, measuring_doubts, specimen_limits, trades, tuning_tables
 from .report.validate_machine import drift_blocks
@@ -67,7 +68,7 @@ def print_iterations(result: Iterated, loop: Mapping[str, Any]) -> None:
 
 def print_sine(test: SineTest, loop: Mapping[str, Any]) -> None:
     """Print the verdict, amplitude, phase and distortion without and with cancellers."""
-    amplitude = f"{test.amplitude:g} {'m' if test.axis in 'xyz' else 'rad'}"
+    amplitude = shown_as(test.amplitude, axis_scale(test.axis, "displacement"))
     what = f"{amplitude} at {test.frequency:g} Hz in {test.axis}"
     print_blocks(sine_verdict(test, loop)[0], what, sine_table(test))
 

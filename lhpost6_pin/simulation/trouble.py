@@ -129,12 +129,12 @@ def run_doubts(run: Run) -> list[str]:
 
 def _lowest(run: Run, level: float) -> list[_Low]:
     """Chambers that fell below a level [Pa]."""
+    least = np.fmin.reduce(run.z, axis=0)  # of all states: along rows, as a column apart is read far slower
     found = []
     for chamber in _chambers(run.plant):
-        pressure = run.z[:, chamber.place]
-        below = pressure < level
-        if below.any():
-            found.append(_Low(chamber, float(run.time[int(below.argmax())]), float(np.nanmin(pressure))))
+        if least[chamber.place] < level:
+            first = int((run.z[:, chamber.place] < level).argmax())
+            found.append(_Low(chamber, float(run.time[first]), float(least[chamber.place])))
     return found
 
 

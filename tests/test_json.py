@@ -140,6 +140,8 @@ def test_doctor_decompose_and_export_state_theirs(said):
     entries, _ = said("decompose", PRACTICE)
     assert entries["axes"]["x"]["actuators"]["rrmse"] < 0.5 and len(entries["files"]) == 2
     assert set(entries) == documented("decompose")
+    assert all(one["delay_standard_error"] > 0.0 for one in entries["axes"].values() if one["delay"] is not None)
+    assert all(set(one) == {"delay", "standard_error"} for one in entries["skews"].values())
     entries, _ = said("export", PRACTICE, "--to", "csv", "--out", "a.csv")
     assert entries == {"files": ["a.csv"]}
 

@@ -196,9 +196,11 @@ def agreement_entries(found: "Decomposed", agreement: "WrenchAgreement") -> Entr
             for name, one in matches.items()
         }
         own = {name: values[k] for name, values in residual.items()}
-        axes[AXES[k]] = forces | {"delay": agreement.actuators.delay[k], "residual": own}
+        delay = {"delay": agreement.actuators.delay[k], "delay_standard_error": agreement.actuators.delay_error[k]}
+        axes[AXES[k]] = forces | delay | {"residual": own}
+    skews = {group: _picked(delay, "delay", "standard_error") for group, delay in found.delays.items()}
     interface = None if agreement.interface is None else _interface_entries(agreement.interface)
-    return {"compared_up_to_hz": found.comparison.band.high, "axes": axes, "interface": interface}
+    return {"compared_up_to_hz": found.comparison.band.high, "skews": skews, "axes": axes, "interface": interface}
 
 
 def _interface_entries(found: "InterfaceWrench") -> Entries:

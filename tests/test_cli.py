@@ -367,7 +367,7 @@ def test_commands_of_the_469d_say_why_they_take_no_other_controller(lhpost6, tmp
         (("--amplitude", "0"), ("--amplitude 0", "above zero")),
         (("--amplitude", "-1"), ("--amplitude",)),
         (("--amplitude", "10", "--frequency", "5"), ("largest --amplitude that fits",)),
-        (("--amplitude", "0.75"), ("exceeds", "The largest --amplitude that fits is 0.36", "--valves 2")),
+        (("--amplitude", "0.75"), ("exceeds", "The largest --amplitude that fits is 0.369m; ", "--valves 2")),
     ],
 )
 def test_a_sine_that_cannot_be_is_refused(lhpost6, tmp_path, arguments, phrases):

@@ -171,7 +171,7 @@ def test_an_export_is_imported_without_a_map(lhpost6, tmp_path, record):
     ("arguments", "phrase"),
     [
         (("import", "gone.csv"), "gone.csv: no such file"),
-        (("import", "run.csv"), "--guess writes a first map"),
+        (("import", "run.csv"), "with --guess writes a first map"),
         (("import", "run.csv", "--guess", "--map", "m.toml"), "give one of them"),
         (("import", "run.csv", "--map", "gone.toml"), "gone.toml: cannot be read"),
         (("export", "gone.nc", "--to", "csv"), "gone.nc: no such file"),

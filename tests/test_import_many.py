@@ -74,7 +74,7 @@ def test_a_file_that_cannot_be_read_does_not_keep_the_others_from_it(lhpost6, tm
 
 
 def test_where_nothing_can_be_imported_it_is_an_error(lhpost6, tmp_path, campaign):
-    assert refused(lhpost6("import", "t1", *UNIAXIAL), "which column is which channel? --guess writes a first map")
+    assert refused(lhpost6("import", "t1", *UNIAXIAL), "This command with --guess writes a first map")
     assert not list((tmp_path / "out").rglob("*.nc"))
 
 

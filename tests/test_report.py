@@ -364,6 +364,20 @@ def test_the_governing_limit_comes_first_and_every_quantity_has_its_row(tmp_path
     assert re.search(r">Spool</th>.{0,60}?[\d.]+ of the stroke<", rows)
 
 
+def test_speeds_of_actuators_are_those_between_answered_samples(tmp_path):
+    """Samples that a controller missed repeat the row before: their jump was a speed of three times the limit."""
+    record = make_record()
+    t, amplitude, w = record["time"].values, 0.06, 2 * np.pi * 1.5
+    answered = np.arange(len(t)) % 400 < 380  # twenty in a row are missed
+    last = np.maximum.accumulate(np.where(answered, np.arange(len(t)), 0))
+    record["actuator_displacement"] = (("time", "actuator"), np.outer(amplitude * np.sin(w * t), np.ones(10))[last])
+    record["answered"] = (("time",), answered.astype(np.int8))
+    limits = {**LIMITS, "actuator_extending": [4.0] * 10, "actuator_retracting": [4.0] * 10}
+    summary, _ = report(tmp_path, record, limits=limits)
+    peak = next(use.peak for use in summary.limits if use.quantity == "actuator velocity")
+    assert peak == pytest.approx(amplitude * w, rel=0.01)  # differences over twenty samples lose (20 w dt)^2 / 6 of it
+
+
 def test_commands_in_banners_and_notes_are_set_as_code():
     page = render_page(Page("Kind", "Title", "Purpose", "Run `lhpost6 check <a>`.", "good", (), (), notes=["a `b`"]))
     assert "Run <code>lhpost6 check &lt;a&gt;</code>." in page and "<li>a <code>b</code></li>" in page

@@ -68,7 +68,9 @@ def serve(
     machine: SpecimenOptions,
     view: LiveOptions,
     exchange: ExchangeOptions,
-    mode: Annotated[str, typer.Option(help="lock-step, real-time, or free (as fast as possible).")] = "lock-step",
+    mode: Annotated[
+        str, typer.Option(help="lock-step (waits for each command), real-time, or free (as fast as possible).")
+    ] = "lock-step",
     host: Annotated[str, typer.Option(help="Address to listen on; default: this computer only.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="UDP port; 0: any free one.")] = 46946,
     seconds: Annotated[float | None, typer.Option(min=0.0, help=r"Duration \[s]; default: until ended.")] = None,

@@ -177,8 +177,10 @@ def sine(
     settings = opt.find_settings(controller, table)
     folder = opt.folder_for(out, f"sine_{axis}_{size:g}_{frequency:g}Hz", "report.html")
     if not beyond:
-        target = sine_target(axis, size, frequency)[0]
-        check_motion_limits(plant, target, size=lambda s: f"--amplitude that fits is {rounded_down(size * s, 3):g}")
+        target, unit = sine_target(axis, size, frequency)[0], _unit(axis)
+        check_motion_limits(
+            plant, target, size=lambda s: f"--amplitude that fits is {rounded_down(size * s, 3):g}{unit}"
+        )
     loop = loop_facts(checked_loop(table, settings, machine), machine)
     with progress_bar(f"sine in {axis} on {table.name}") as progress:
         found = sine_test(table, settings, axis=axis, amplitude=size, frequency=frequency, progress=progress)
@@ -191,9 +193,14 @@ def sine(
     print_result(json, entries, lambda: print_sine(found, loop), [report])
 
 
+def _unit(axis: str) -> str:
+    """Unit of an amplitude."""
+    return "m" if axis in AXES[:3] else "rad"
+
+
 def _amplitude(text: str, axis: str) -> float:
     """Amplitude on an axis [m, rad], as a user wrote it."""
-    unit = "m" if axis in AXES[:3] else "rad"
+    unit = _unit(axis)
     numbers = numbers_in(text, unit)
     if numbers is None or len(numbers) > 1 or not numbers[0] > 0.0:
         example = "50mm" if unit == "m" else "1deg"

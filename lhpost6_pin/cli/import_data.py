@@ -84,7 +84,10 @@ def _write_draft_map(
     save_map(found, path, remarks)
     then = f"{again} --map {shlex.quote(str(path))}"
     left = f"{len(remarks)} remark{'s' * (len(remarks) != 1)}"
-    hint = f"{path}: {len(found.channels)} channels, {left}; read and edit it, then\n{then}"
+    count = f"{len(found.channels)} channels, {left}; read and edit it"
+    if not found.channels:
+        count = f"no column was recognised, {left}; state in it which column is which channel"
+    hint = f"{path}: {count}, then\n{then}"
     entries = {"channels": len(found.channels), "remarks": remarks, "then": then}
     print_result(json, lambda: entries, lambda: typer.echo(hint), [path])
 
@@ -94,7 +97,9 @@ def _mapped(raws: "Sequence[RawTest]", table: "Machine", map_: Path | None, file
     from ..data.importing import guess_map, is_export, load_map
 
     if map_ is None and not is_export(raws):
-        raise RecordError(f"{file}: which column is which channel? --guess writes a first map, --map uses one")
+        raise RecordError(
+            f"{file}: which column is which channel? This command with --guess writes a first map, --map uses one"
+        )
     return load_map(map_) if map_ else guess_map(raws, table.labels).channels
 
 

@@ -209,7 +209,7 @@ def _starts_in_motion(c: _Column) -> _Warning | None:
         return None
     if abs(soon - start) > least or c.is_rate:
         remedy = "begin the record before the motion" + "; if it was at rest there, subtract the offset" * c.is_rate
-        return c.channel, 0, f"starts at {start:.4g}, not at rest", remedy
+        return c.channel, 0, f"starts at {start:.4g} (median of eight samples), not at rest", remedy
     remedy = "right if the table rested there, parked or held; else an offset: subtract it"
     return None if c.is_command else (c.channel, 0, f"rests at {start:.4g} at the start, not at zero", remedy)
 

@@ -14,7 +14,8 @@ import xarray as xr
 from ..core.arrays import Mask
 from .filled_samples import between_gaps
 
-__all__ = ["ANSWERED", "PLANT_STATE", "SAFE_HOLD", "cut_notes", "judged_samples", "part_compared", "served_findings"]
+__all__ = ["ANSWERED", "PLANT_STATE", "SAFE_HOLD", "answered_samples", "cut_notes", "judged_samples", "part_compared"]
+__all__ += ["served_findings"]
 
 log = logging.getLogger(__name__)
 
@@ -59,14 +60,19 @@ def cut_notes(record: xr.Dataset) -> tuple[str, ...]:
     return (*((cut,) if _TRIP.match(cut) else ()), *((gap,) if gap else ()))
 
 
+def answered_samples(dataset: xr.Dataset) -> Mask:
+    """Samples (n,) that the controller answered; all where a record does not state it."""
+    return np.asarray(_row(dataset, ANSWERED, 1) != 0)
+
+
 def judged_samples(dataset: xr.Dataset) -> Mask:
     """Samples (n,) that sensors are judged by: answered, and not of a safe hold; all where a record states neither."""
-    return _answered(dataset) & (_row(dataset, PLANT_STATE, 0) != SAFE_HOLD)
+    return answered_samples(dataset) & (_row(dataset, PLANT_STATE, 0) != SAFE_HOLD)
 
 
 def served_findings(dataset: xr.Dataset) -> Iterator[tuple[str, int | None, str, str]]:
     """Channel, sample, message and remedy: unanswered samples, and what the record states as its trouble."""
-    missed = ~_answered(dataset)
+    missed = ~answered_samples(dataset)
     if missed.any():
         count = int(missed.sum())
         what = f"{count} sample{'s'[: count != 1]} without an answer of the controller (`{ANSWERED}`)"
@@ -74,10 +80,6 @@ def served_findings(dataset: xr.Dataset) -> Iterator[tuple[str, int | None, str,
     trouble = str(dataset.attrs.get("trouble", "none"))
     if trouble not in ("none", ""):
         yield "", None, trouble, "what follows is not the test's"
-
-
-def _answered(dataset: xr.Dataset) -> Mask:
-    return np.asarray(_row(dataset, ANSWERED, 1) != 0)
 
 
 def _row(dataset: xr.Dataset, name: str, usual: int) -> np.ndarray:

@@ -122,7 +122,7 @@ def check_limits(
     `check` adds demands on actuators and parts; texts are in `units`. Raises OutOfRangeError with the largest scale
     within the limits, then a clause per exceeded quantity, axes before actuators: the governing one with its value,
     limit, time and sample, and the names of the others. Of a target that has no scale for its user, `size` gives
-    the words behind "The largest" for a scale, as "--amplitude that fits is 0.36".
+    the words behind "The largest" for a scale, as "--amplitude that fits is 0.36m".
     """
     peaks = limit_peaks(target, limits, check, units)
     over = [peak for peak in peaks if peak.decides and peak.utilisation > _FULL]

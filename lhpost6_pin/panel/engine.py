@@ -187,7 +187,8 @@ class Engine:
         _refuse(self._state == PlantState.TRIPPED, "the plant has stopped; set the pressure off, and start again")
         at = self._interlocks.look(self._now, np.zeros(len(self._command)))
         if at is not None:
-            raise ControllerError(f"still {self._interlocks.reason(at, self._last / SAMPLE_RATE)}; raise that limit")
+            why = self._interlocks.reason(at, self._last / SAMPLE_RATE)
+            raise ControllerError(f"still {why}; {self._interlocks.remedy(at, self._margin)}")
         self.trip = ""
         self._start_at_place()
         if self._place != "raised":  # on from here only by another order

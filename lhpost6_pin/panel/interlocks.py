@@ -149,14 +149,18 @@ class Interlocks:
             needed = float(shares[at]) + margin
             if shares[at] == 0.0 or not self.on[i] or self.limit[i] >= needed:
                 continue
-            name, percent = INTERLOCKS[i], math.ceil(100.0 * needed - 1e-9)
+            name = INTERLOCKS[i]
             unit = place_unit(AXES[at]) + _PER[name]
             return (
                 f"{name} of {AXES[at]} would reach {in_page_units(float(abs(largest[at])), unit, 4)}, "
                 f"{100.0 * shares[at]:.1f} % of capacity, and the interlock trips at {100.0 * self.limit[i]:g} %; "
-                f"raise the {name} limit to at least {percent} % first"
+                f"{_raised(name, needed)} first"
             )
         return ""
+
+    def remedy(self, i: int, margin: float) -> str:
+        """The limit at which an interlock would not trip on the last sample; `margin` as in `barrier`."""
+        return _raised(INTERLOCKS[i], float(self.shares[i]) + margin)
 
     def where(self, i: int) -> str:
         """Axis or actuator of an interlock's largest share."""
@@ -174,3 +178,8 @@ class Interlocks:
             value, limit = (in_page_units(x * bound, unit, 4) for x in (share, float(self.limit[i])))
             what = f"{name} of {self.where(i)} {value}, limit {limit}"
         return f"{what}, at {time:.3f} s"
+
+
+def _raised(name: str, needed: float) -> str:
+    """Advice to raise an interlock's limit to a share of capacity."""
+    return f"raise the {name} limit to at least {math.ceil(100.0 * needed - 1e-9)} %"

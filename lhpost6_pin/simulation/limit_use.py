@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ..core.arrays import Array
 from ..core.errors import UnknownNameError
 from ..data.metrics import SpoolUse, Tracking, channel, labels, peaks, sampling
+from ..data.served_samples import answered_samples
 from ..mechanics.equilibrium import actuator_speeds
 from ..mechanics.plant import Plant
 from ..motions import Peak
@@ -171,13 +172,23 @@ def _of_actuators(record: xr.Dataset, limits: Limits) -> Iterator[tuple[str, Arr
         moved = channel(record, "actuator_displacement")
         stroke = peaks(moved)
         yield "actuator stroke", stroke, shares_of_limit(stroke, limits, "actuator_stroke")
-        velocity = np.gradient(moved, sampling(record)[1], axis=0)
+        velocity = _rates(record, moved)
         out, back = peaks(np.maximum(velocity, 0.0)), peaks(np.maximum(-velocity, 0.0))
         extending = shares_of_limit(out, limits, "actuator_extending")
         retracting = shares_of_limit(back, limits, "actuator_retracting")
         peak = np.where(extending >= retracting, out, back)
         yield "actuator velocity", peak, np.maximum(extending, retracting)
     yield from force_use(record, limits)
+
+
+def _rates(record: xr.Dataset, values: Array) -> Array:
+    """Rates of a channel's values (n, k) between samples that were answered: others repeat the row before them."""
+    shown = answered_samples(record)
+    if shown.all():
+        return np.gradient(values, sampling(record)[1], axis=0)
+    if np.count_nonzero(shown) < 2:
+        return np.zeros_like(values)
+    return np.gradient(values[shown], record["time"].values[shown], axis=0)
 
 
 def governing_limits(uses: Iterable[LimitUse]) -> list[LimitUse]:

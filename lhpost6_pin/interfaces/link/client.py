@@ -27,7 +27,7 @@ from ...core.errors import LinkError
 from ...mechanics.coupled import BaseMotion, motion_of_numbers, wrench_of
 from ...simulation.running import PressureReading
 from .clock import SECOND, Histogram, now
-from .protocol import COUNTS, MOTION, Datagram, Kind, LinkMode, PlantState, decode, encode, is_newer
+from .protocol import COUNTS, MOTION, SESSION, Datagram, Kind, LinkMode, PlantState, decode, encode, is_newer
 from .server import HOST, PORT
 
 __all__ = ["LinkClient", "Reading"]
@@ -243,7 +243,8 @@ class LinkClient:
         if reading is not None and reading.sample:
             return (
                 f"{self._where} answered up to sample {reading.sample} and was silent for "
-                f"{self._timeout * self._tries:g} s after it; the server has ended, or the network fails"
+                f"{self._timeout * self._tries:g} s after it; the server has ended, or freed the plant after "
+                f"{SESSION:g} s without a command, or the network fails"
             )
         return (
             f"{self._where} did not answer within {self._timeout * self._tries:g} s; start the plant there with "

@@ -69,11 +69,12 @@ What happens
     bye (again until answered)     ->   the client's place is free
                                    <-   status
 
-In lock-step the plant moves one sample for each new command; the same command again gets the same sensors again, so
-a client without an answer sends it again. In real time and free running the plant moves by itself from the first
-command on, takes the newest command at each sample and sends sensors after each. A hello with another session number
-puts the plant at rest again, also a tripped one. Rest is in the zero-position, or where the server parks the platen:
-the pose in the sensors of sample 0 says which.
+In lock-step the plant moves one sample for each new command, and waits for it; the same command again gets the same
+sensors again, so a client without an answer sends it again. In any mode ten seconds without a datagram free the place.
+In real time and free running the plant moves by itself from the first command on, takes the newest command at each
+sample and sends sensors after each. A hello with another session number puts the plant at rest again, also a tripped
+one. Rest is in the zero-position, or where the server parks the platen: the pose in the sensors of sample 0 says
+which.
 
 Pressures. A client that sets bit 2 in its hello gets them with all sensors of its session, others get sensors without.
 A server that does not know the bit sends sensors without: a client looks at the flags of each frame.
@@ -100,7 +101,7 @@ from ...core.arrays import Array
 from ...core.checksum import crc_of, with_crc
 from ...core.errors import LinkError, UnknownNameError
 
-__all__ = ["COUNTS", "MOTION", "VERSION", "Datagram", "Kind", "LinkMode", "PlantState", "ShortDatagramError"]
+__all__ = ["COUNTS", "MOTION", "SESSION", "VERSION", "Datagram", "Kind", "LinkMode", "PlantState", "ShortDatagramError"]
 __all__ += ["VersionError", "Welcome"]
 __all__ += ["decode", "encode", "find_mode", "is_newer", "refusal"]
 
@@ -108,6 +109,8 @@ __all__ += ["decode", "encode", "find_mode", "is_newer", "refusal"]
 MAGIC, VERSION = b"LHP6", 2
 MOTION = 18
 """Numbers of the motion of the interface: pose, twist, acceleration."""
+SESSION = 10.0
+"""Silence [s] after which a client's place is free and the plant stops moving."""
 COUNTS = {
     "received": "datagrams received",
     "late": "commands older than one before",

@@ -1,11 +1,10 @@
 """A plant that a remote client commands: its response to datagrams and samples, without sockets and clocks.
 
-Safe hold. After five samples without a new command, in lock-step after a second of silence, the spools go over to
-those that hold the platen at rest, along a smooth ramp of 0.2 s: twice the period of the softest oil column, so that
-the oil decelerates the platen without impact. When commands return they are blended in from the spools as they are,
-along a ramp as long as the hold was, at most as long as the one into it: smooth after a long silence, and a link that
-drops out again and again still commands. In lock-step, where time stands still between commands, the plant runs
-through the ramp at once.
+Safe hold. After five samples without a new command the spools go over to those that hold the platen at rest, along a
+smooth ramp of 0.2 s: twice the period of the softest oil column, so that the oil decelerates the platen without
+impact. When commands return they are blended in from the spools as they are, along a ramp as long as the hold was, at
+most as long as the one into it: smooth after a long silence, and a link that drops out again and again still commands.
+In lock-step time stands still between commands: there is no hold.
 
 Faults. Each is a plant of its own, made before a client comes. To go over to it (`RunningPlant.with_plant`) takes
 0.25 ms on an idle core, twice as much on a busy one, beside the sample's own 0.1 ms: the one sample of a switch
@@ -29,6 +28,7 @@ from ...simulation.snapshot import EVERY, Watch
 from .clock import SECOND, Histogram
 from .protocol import (
     COUNTS,
+    SESSION,
     Datagram,
     Kind,
     LinkMode,
@@ -42,7 +42,7 @@ from .protocol import (
     refusal,
 )
 
-__all__ = ["MISSED_FRAMES", "PATIENCE", "RAMP", "SESSION", "ServedPlant"]
+__all__ = ["MISSED_FRAMES", "RAMP", "ServedPlant"]
 
 log = logging.getLogger(__name__)
 
@@ -50,14 +50,8 @@ log = logging.getLogger(__name__)
 MISSED_FRAMES = 5
 """Samples in a row without a new command after which the plant goes to its safe hold."""
 
-PATIENCE = 1.0
-"""Silence [s] after which a plant in lock-step does."""
-
 RAMP = round(0.2 * SAMPLE_RATE)
 """Samples over which the spools go over to the hold; the most that they take back to the commands."""
-
-SESSION = 10.0
-"""Silence [s] after which a client's place is free and the plant stops moving."""
 
 
 class ServedPlant:
@@ -189,17 +183,9 @@ class ServedPlant:
 
     def watch(self, now: int) -> None:
         """Check that the client is still there; to be called repeatedly."""
-        silence = (now - self._heard) / SECOND
-        if not self._taken:
-            return
-        if silence > SESSION:
+        if self._taken and (now - self._heard) / SECOND > SESSION:
             log.warning("no datagram from %s for %g s: the plant is free for another client", self._owner, SESSION)
             self._taken = False
-        elif self.mode == LinkMode.LOCK_STEP and silence > PATIENCE and self.state == PlantState.RUNNING:
-            self.counts["missed_frames"] += MISSED_FRAMES
-            self._hold()
-            for _ in range(RAMP):
-                self._move(now)
 
     def _hello(self, frame: Datagram, sender: Hashable, now: int) -> list[bytes]:
         self._heard, self._commanding = now, False

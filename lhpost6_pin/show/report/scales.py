@@ -65,7 +65,7 @@ def axis_scale(axis: str, quantity: str) -> Scale:
 
 def force_scale(axis: str) -> Scale:
     """Return how the force, or moment, of an axis is shown."""
-    return Scale(1e-3, "kN m" if axis in ROTATIONS else "kN")
+    return Scale(1e-3, "kN m" if axis in ROTATIONS else "kN", 1e-9)  # below 1 uN, 1 uN m: of forces of some kN
 
 
 SMALL_LOAD = 1e5

@@ -339,6 +339,7 @@ def test_the_verdict_on_a_run_that_stopped_begins_with_that_and_judges_nothing_e
     summary, _ = report(tmp_path, record, limits=LIMITS)
     assert summary.verdict.startswith("The run stopped at 0.1606 s: V1 left its stroke of +-0.4 m: tracking is")
     assert "RRMSE" not in summary.verdict and "limits" not in summary.verdict and summary.level == "bad"
+    assert summary.headlines[0].note == "tracking is not judged"
 
 
 def test_the_governing_limit_comes_first_and_every_quantity_has_its_row(tmp_path):

@@ -100,7 +100,7 @@ def write_run_report(
     uses = [*limit_uses(record, found, spools, bounds), *uses_of_peaks(demands)]
     verdict, level = verdict_of_run(record, found, spools, uses, notes)
     absent = tuple(name for name in EXPECTED if name not in record)
-    lists = tuple(headlines(found, uses)), tuple(found), tuple(spools), tuple(uses), tuple(measures), absent
+    lists = tuple(headlines(record, found, uses)), tuple(found), tuple(spools), tuple(uses), tuple(measures), absent
     summary = RunSummary(None if path is None else Path(path), verdict, level, *lists)
     if summary.path is None:
         return summary

@@ -28,9 +28,9 @@ def verdict_of_run(
     notes: Sequence[str],
 ) -> tuple[str, Level]:
     """Return the verdict and its level: clipped spools, tracking, limits, control loop, notes."""
-    stopped = str(record.attrs.get("trouble", "none")).partition(";")[0]
+    stopped = _trouble(record)
     clipped, loop, unstable = _clipped(record, spools), *loop_sentence(record.attrs)
-    if stopped != "none":  # the part before the stop does not represent the test
+    if stopped:  # the part before the stop does not represent the test
         clipped = "" if recorded_divergence(record.attrs) else clipped
         sentences = [f"The run {stopped}: tracking is not judged.", clipped, loop, "See the notes."]
         return " ".join(filter(None, sentences)), "bad"
@@ -58,9 +58,15 @@ def verdict_of_run(
     return " ".join(filter(None, sentences)), level
 
 
-def headlines(found: Sequence[Tracking], uses: Sequence[LimitUse]) -> list[Headline]:
+def headlines(record: xr.Dataset, found: Sequence[Tracking], uses: Sequence[LimitUse]) -> list[Headline]:
     """Return worst RRMSE, peak displacement and the governing limit."""
-    return [_worst_rrmse(found), _peak_displacement(found), _governing_limit(uses)]
+    return [_worst_rrmse(record, found), _peak_displacement(found), _governing_limit(uses)]
+
+
+def _trouble(record: xr.Dataset) -> str:
+    """How a run stopped or lost its commands; empty where it did neither."""
+    trouble = str(record.attrs.get("trouble", "none")).partition(";")[0]
+    return "" if trouble == "none" else trouble
 
 
 def _followed(record: xr.Dataset, found: Sequence[Tracking], *, clipped: bool) -> tuple[str, Level]:
@@ -98,7 +104,9 @@ def _clipped(record: xr.Dataset, spools: Sequence[SpoolUse]) -> str:
     return f"{start}: {', '.join(full)}." if full else f"{start}."
 
 
-def _worst_rrmse(found: Sequence[Tracking]) -> Headline:
+def _worst_rrmse(record: xr.Dataset, found: Sequence[Tracking]) -> Headline:
+    if _trouble(record):
+        return Headline("–", "Worst acceleration RRMSE", "tracking is not judged")
     for quantity in ("acceleration", "velocity", "displacement"):
         worst = _worst(found, quantity)
         if worst:

@@ -381,6 +381,8 @@ def test_a_miss_is_listed_with_the_reason_of_the_last_round():
     assert scoring.misses(label, answer) == [("quadratic_drag", 0.7, "too little (gain 7)")]
     answer["withdrawn"] = [{"family": "quadratic_drag", "why": "held_out"}]
     assert scoring.misses(label, answer)[0][2] == "withdrawn: held_out"
+    blind = {**answer, "withdrawn": [], "considered": [], "not_testable": ["quadratic_drag"]}
+    assert scoring.misses(label, blind)[0][2] == "not testable with the sensors that were left"
     assert scoring.misses(labelled("null", "none"), told("none")) == []
 
 

@@ -133,7 +133,8 @@ def misses(label: Label, answer: Answer) -> list[tuple[str, float, str]]:
         gone = [f"withdrawn: {w['why']}" for w in answer.get("withdrawn", ()) if w["family"] == family]
         seen = [c for one in answer.get("considered", ()) for c in one if c["family"] == family]
         last = [f"{c['refused'] or 'passes, but another fits as well'} (gain {c['gain']:.0f})" for c in seen[-1:]]
-        why = (gone or last or ["no gain"])[0]
+        blind = ["not testable with the sensors that were left"] * (family in answer.get("not_testable", ()))
+        why = (gone or last or blind or ["no gain"])[0]
         found.append((family, max(effect["gap"], effect["offset"]), why))
     return found
 

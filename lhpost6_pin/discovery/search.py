@@ -56,6 +56,7 @@ def search(found: Search, keep: Callable[[Search], None], progress: Progress) ->
         more = (_more_effects(found, linear, first) or _screened_as_stated(found, second)) if k < most else None
         if more is None:
             break
+        del linear  # as large as the next one
         found = more
         keep(found)
     fewer = _pruned(found)

@@ -198,4 +198,5 @@ def linearise(solution: Solution, calibration: Parameters, *, replicas: bool = F
     inward = (x <= low + near).astype(float) - (x >= high - near)
     background = Background(slopes(normal.rows), rests(normal.residual), root, matrix, side, x / prior, inward, noise)
     more = tuple((r, OperatingPoint(r, x)) for r in problem.replicas) if replicas else ()
+    normal.released()
     return Linearisation(OperatingPoint(problem, x), background, more)

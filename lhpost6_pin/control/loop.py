@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.arrays import Array
-from ..core.compiled import compiled, compiled_inline, compiled_views
+from ..core.compiled import borrowed, compiled, compiled_inline, compiled_views
 from ..core.names import SAMPLE_RATE
 from ..laws.orifice import spool_for_opening
 from ..mechanics.accelerometers import composed_acceleration
@@ -123,7 +123,8 @@ _AXIS_SIZE, _ACTUATOR_SIZE, _CANCELLER_SIZE = (d.itemsize // 8 for d in (AXIS, A
 
 @compiled_views
 def unpack_control(packed):
-    """Tables of a controller from `ControlTables.packed`."""
+    """Tables of a controller from `ControlTables.packed`, which the caller holds."""
+    packed = borrowed(packed)
     axes, n, cancellers = int(packed[0]), int(packed[1]), int(packed[2])
     actuator = 3 + _AXIS_SIZE * axes
     balance = actuator + _ACTUATOR_SIZE * n

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.arrays import Array
-from ..core.compiled import compiled_views
+from ..core.compiled import borrowed, compiled_views
 from ..effects.registry import ROW
 from ..laws.supply import Supply
 from .forward_dynamics import INERTIA
@@ -61,7 +61,8 @@ def pack_tables(
 
 @compiled_views
 def unpack_tables(packed):
-    """Tables from `Tables.packed`."""
+    """Tables from `Tables.packed`, which the caller holds."""
+    packed = borrowed(packed)
     at = packed[: _PARTS + 1].view(np.int64)
     values = packed[at[13] : at[14]]
     supply = Supply(values[0], values[1], values[2], values[3], values[4], values[5], values[6], values[7], values[8])

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.compiled import compiled_views
+from ..core.compiled import borrowed, compiled_views
 from ..effects.registry import PORTS
 from .plant import Plant, State
 from .schemes import V
@@ -51,7 +51,8 @@ def make_workspace(plant: Plant, start: State) -> Workspace:
 
 @compiled_views
 def unpack_workspace(buffer):
-    """Workspace from its buffer."""
+    """Workspace from its buffer, which the caller holds."""
+    buffer = borrowed(buffer)
     nq, states, nv = int(buffer[0]), int(buffer[1]), int(buffer[2])
     n, rows, modes = int(buffer[3]), int(buffer[4]), int(buffer[5])
     z = _HEAD + nq

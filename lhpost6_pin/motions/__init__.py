@@ -13,7 +13,7 @@ from .limits import (
     check_limits,
     largest_scale,
     limit_peaks,
-    peak_of_demand,
+    sample_blocks,
 )
 from .motion import AXES, GroundMotion, make_motion
 from .motion_options import MotionOption
@@ -53,9 +53,9 @@ __all__ = [
     "make_target",
     "match_spectrum",
     "motion_options",
-    "peak_of_demand",
     "required_spectrum",
     "response_spectrum",
+    "sample_blocks",
     "smooth_step",
     "spectrum_errors",
     "with_rotation",

@@ -1,6 +1,6 @@
 """Demand of a target over the capacity of the table, and the largest scale within it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -12,12 +12,13 @@ from .motion import AXES
 from .process import Target
 
 __all__ = ["SI", "Demand", "LimitsSummary", "MotionCheck", "MotionLimits", "Peak", "Units", "check_limits"]
-__all__ += ["largest_scale", "less_reserve", "limit_peaks", "peak_of_demand"]
+__all__ += ["largest_scale", "less_reserve", "limit_peaks", "sample_blocks"]
 
 _QUANTITIES = ("displacement", "velocity", "acceleration")
 _FULL = 1 + 1e-6  # a motion exactly at the limit passes despite rounding
 _CLOSE = 1e-4  # relative width to which the largest scale is bracketed
 _STRIDE = 8  # samples of which one is looked at first: 4 ms of a target, within which its demands hardly change
+_BLOCK = 4096  # samples that are looked at at once: their demands stay in the processor's cache
 _GOVERNING = 0.5  # of the largest share: samples with as much are looked at first, as demands are nearly linear
 
 
@@ -59,7 +60,7 @@ def less_reserve(share: float) -> str:
 
 
 MotionCheck = Callable[[np.ndarray, np.ndarray, np.ndarray], Sequence[Demand]]
-"""From displacement, velocity and acceleration (n, 6) of a motion to its demands on a table."""
+"""From displacement, velocity and acceleration (n, 6) of a motion to its demands on a table, sample by sample."""
 
 
 Units = Mapping[str, tuple[str, float]]
@@ -124,7 +125,7 @@ def check_limits(
     limit, time and sample, and the names of the others. Of a target that has no scale for its user, `size` gives
     the words behind "The largest" for a scale, as "--amplitude that fits is 0.36m".
     """
-    peaks = limit_peaks(target, limits, check, units)
+    peaks = limit_peaks(target, limits, _demands(target, check) if check else (), units)
     over = [peak for peak in peaks if peak.decides and peak.utilisation > _FULL]
     if over:
         fits = largest_scale(target, limits, check)
@@ -188,28 +189,56 @@ def _bracketed(target: Target, check: MotionCheck, high: float, share: float, go
     return low
 
 
-def peak_of_demand(demand: Demand, units: Units = SI) -> list[Peak]:
-    """Largest share of each axis, actuator or part of a demand, with texts in `units`."""
-    shares = np.nan_to_num(np.abs(demand.share), nan=np.inf, posinf=np.inf)
-    peaks = []
-    for i, name in enumerate(demand.names):
-        sample = int(np.argmax(shares[:, i]))
-        share = float(shares[sample, i])
-        text = f"{100 * share:.4g} % {demand.of}" if np.isfinite(share) else f"infinitely many times {demand.of}"
-        if demand.value is not None and demand.unit:
-            text = f"{_with_unit(abs(demand.value[sample, i]), demand.unit, units)}, {text}"
-        value = None if demand.value is None else float(demand.value[sample, i])
-        peaks.append(Peak(demand.quantity, name, share, sample, text, demand.decides, value))
-    return peaks
+def sample_blocks(samples: int) -> list[slice]:
+    """Consecutive parts of a motion, in which its demands are evaluated."""
+    return [slice(at, at + _BLOCK) for at in range(0, samples, _BLOCK)]
 
 
 def limit_peaks(
-    motion: Motion, limits: MotionLimits, check: MotionCheck | None = None, units: Units = SI
+    motion: Motion, limits: MotionLimits, demands: Iterable[Sequence[Demand]] = (), units: Units = SI
 ) -> tuple[Peak, ...]:
-    """Largest demand of a motion on every limit, axes before others, with texts in `units`; nothing is refused."""
-    demands = _demands(motion, check) if check else ()
-    on_axes = _axis_peaks(motion, limits, units)
-    return (*on_axes, *(peak for demand in demands for peak in peak_of_demand(demand, units)))
+    """Largest demand of a motion on every limit, axes before others, with texts in `units`; nothing is refused.
+
+    demands: those of its consecutive parts on the table (`sample_blocks`).
+    """
+    largest: list[_Largest] = []
+    start = 0
+    for block in demands:
+        largest = largest or [_Largest(demand) for demand in block]
+        for so_far, demand in zip(largest, block, strict=True):
+            so_far.add(demand, start)
+        start += len(block[0].share) if block else 0
+    return (*_axis_peaks(motion, limits, units), *(peak for found in largest for peak in found.peaks(units)))
+
+
+class _Largest:
+    """Largest share of each axis, actuator or part in the parts of a motion seen so far, and where it is."""
+
+    def __init__(self, demand: Demand) -> None:
+        count = len(demand.names)
+        self._demand = demand
+        self._share, self._sample, self._value = np.full(count, -1.0), np.zeros(count, int), np.zeros(count)
+
+    def add(self, demand: Demand, start: int) -> None:
+        """Take in the demand of a part that begins at sample `start`."""
+        shares, each = _magnitudes(demand.share), np.arange(len(self._share))
+        at = np.argmax(shares, axis=0)
+        higher = shares[at, each] > self._share
+        self._share[higher], self._sample[higher] = shares[at, each][higher], start + at[higher]
+        if demand.value is not None:
+            self._value[higher] = demand.value[at, each][higher]
+
+    def peaks(self, units: Units) -> list[Peak]:
+        """One per axis, actuator or part, with texts in `units`."""
+        quantity, names, _, of, values, unit, decides = self._demand
+        found = []
+        for name, share, sample, value in zip(names, self._share, self._sample, self._value, strict=True):
+            text = f"{100 * share:.4g} % {of}" if np.isfinite(share) else f"infinitely many times {of}"
+            if values is not None and unit:
+                text = f"{_with_unit(abs(value), unit, units)}, {text}"
+            known = None if values is None else float(value)
+            found.append(Peak(quantity, name, float(share), int(sample), text, decides, known))
+        return found
 
 
 def _with_unit(value: float, unit: str, units: Units) -> str:
@@ -250,19 +279,28 @@ def _axis_peaks(target: Motion, limits: MotionLimits, units: Units = SI) -> list
 
 def _demands(
     motion: Motion, check: MotionCheck, factor: float = 1.0, some: np.ndarray | slice = slice(None)
-) -> Sequence[Demand]:
-    """Demands of some samples of a motion, scaled."""
-    with np.errstate(all="ignore"):  # a pose beyond all reach exceeds every stroke: infinite
-        return check(*(factor * x[some] for x in (motion.displacement, motion.velocity, motion.acceleration)))
+) -> Iterator[Sequence[Demand]]:
+    """Demands of some samples of a motion, scaled, part by part."""
+    moved = [x[some] for x in (motion.displacement, motion.velocity, motion.acceleration)]
+    for block in sample_blocks(len(moved[0])):
+        with np.errstate(all="ignore"):  # a pose beyond all reach exceeds every stroke: infinite
+            yield check(*(factor * x[block] for x in moved))
 
 
 def _deciding(motion: Motion, check: MotionCheck, factor: float, some: np.ndarray | slice = slice(None)) -> np.ndarray:
     """Largest share (n,) of the deciding demands at each of some samples of a motion, scaled."""
-    demands = _demands(motion, check, factor, some)
-    shares = [np.abs(demand.share).max(axis=1) for demand in demands if demand.decides]
-    if not shares:
-        return np.zeros(len(motion.displacement[some]))
-    return np.nan_to_num(np.max(shares, axis=0), nan=np.inf, posinf=np.inf)
+    largest = [np.zeros(0)]
+    for demands in _demands(motion, check, factor, some):
+        shares = [np.abs(demand.share).max(axis=1) for demand in demands if demand.decides]
+        if not shares:
+            return np.zeros(len(motion.displacement[some]))
+        largest.append(_magnitudes(np.max(shares, axis=0)))
+    return np.concatenate(largest)
+
+
+def _magnitudes(shares: np.ndarray) -> np.ndarray:
+    """Magnitudes of shares; infinite where they are not numbers."""
+    return np.nan_to_num(np.abs(shares), nan=np.inf, posinf=np.inf)
 
 
 def _round_down(value: float) -> float:

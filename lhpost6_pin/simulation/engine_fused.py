@@ -146,7 +146,7 @@ def _log_sample(at, ws, window, log):
         log.spool[at, i] = total / steps
 
 
-@compiled
+@compiled_inline
 def log_packed(at, buffer, window, q, v, a, z, spool):
     """`_log_sample` with workspace packed and the log as arrays, which are cheaper to pass from Python."""
     _log_sample(at, unpack_workspace(buffer), window, Log(q, v, a, z, spool))

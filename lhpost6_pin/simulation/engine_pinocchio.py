@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..core.arrays import Array
-from ..core.compiled import compiled
+from ..core.compiled import compiled_inline
 from ..core.names import SCHEMES
 from ..mechanics.derivatives import rates_at
 from ..mechanics.leg_model import Dynamics, make_dynamics
@@ -40,7 +40,7 @@ def make_stepper(plant: Plant, scheme: str, dt: float, forward: Dynamics | None 
     return kinds[scheme](plant, dt, forward or make_dynamics(plant))
 
 
-@compiled
+@compiled_inline
 def staggered_packed(q, dt, packed, buffer, spool):  # type: ignore[no-untyped-def]
     """`staggered_stage` with tables and workspace packed, which are cheaper to pass."""
     return staggered_stage(q, dt, unpack_tables(packed), unpack_workspace(buffer), spool)

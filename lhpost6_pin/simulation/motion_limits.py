@@ -9,7 +9,6 @@ The comparison and the largest scale that fits are in `motions.limits`.
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +25,17 @@ from ..mechanics.interface_wrench import from_interface
 from ..mechanics.motion_demands import MotionDemands
 from ..mechanics.plant import Plant, make_plant
 from ..mechanics.pose import PlatenMotion
-from ..motions import LimitsSummary, MotionLimits, Peak, Reference, Target, check_limits, largest_scale, limit_peaks
+from ..motions import (
+    LimitsSummary,
+    MotionLimits,
+    Peak,
+    Reference,
+    Target,
+    check_limits,
+    largest_scale,
+    limit_peaks,
+    sample_blocks,
+)
 from ..motions.limits import SI, Units
 
 __all__ = ["FLOW", "FlowRemedy", "Judgement", "check_motion_limits", "fitting_scale", "flow_remedies", "judge_motion"]
@@ -123,9 +132,11 @@ def judge_motion(
     """
     bounds, check = _axis_limits(plant), MotionDemands(plant)
     fits = None if target is None else largest_scale(target, bounds, check)
-    return Judgement(
-        limit_peaks(motion, replace(bounds, reserve=0.0), partial(check, achieved=True, specimen=specimen)), fits
+    demands = (
+        check(*(x[some] for x in motion), achieved=True, specimen=None if specimen is None else specimen[some])
+        for some in sample_blocks(len(motion.displacement))
     )
+    return Judgement(limit_peaks(motion, replace(bounds, reserve=0.0), demands), fits)
 
 
 def judge_record(plant: Plant, record: xr.Dataset, *, fits: bool = True) -> Judgement | None:

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.arrays import Array
-from ..core.compiled import borrowed, compiled, compiled_inline, compiled_views
+from ..core.compiled import INTEGER, MATRIX, VECTOR, borrowed, compiled, compiled_inline, compiled_views
 from ..core.names import SAMPLE_RATE
 from ..laws.orifice import spool_for_opening
 from ..mechanics.accelerometers import composed_acceleration
@@ -34,9 +34,9 @@ from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import unpack_workspace
 from .filters import NOTCHES
 
-__all__ = ["ACTUATOR", "AXIS", "CANCELLER", "FEEDBACK", "FORCE", "GENERATOR", "MEMORY_ROWS", "POSE", "ControlTables"]
-__all__ += ["Feedback", "control_packed", "control_sample", "control_step", "pack_control", "sense", "sense_packed"]
-__all__ += ["step_packed"]
+__all__ = ["ACTUATOR", "AXIS", "CANCELLER", "CONTROL_TYPES", "FEEDBACK", "FORCE", "GENERATOR", "MEMORY_ROWS", "POSE"]
+__all__ += ["ControlTables", "Feedback", "control_packed", "control_sample", "control_step", "pack_control", "sense"]
+__all__ += ["sense_packed", "step_packed"]
 
 AXIS = np.dtype(
     [
@@ -326,6 +326,10 @@ def control_packed(sample, drive, tables, buffer, control, memory, command, wind
     """`control_sample` with its tables and workspace packed."""
     plant, ws = unpack_tables(tables), unpack_workspace(buffer)
     return control_sample(sample, drive, plant, ws, unpack_control(control), memory, command, window)
+
+
+CONTROL_TYPES = INTEGER, MATRIX, VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX
+"""Types of the arguments of `control_packed`."""
 
 
 @compiled

@@ -26,9 +26,13 @@ from numba.extending import intrinsic
 
 from .files import refuse_folder
 
-__all__ = ["borrowed", "cache_folder", "compiled", "compiled_inline", "compiled_views", "copy_scaled"]
+__all__ = ["INTEGER", "MATRIX", "SCALAR", "VECTOR"]
+__all__ += ["borrowed", "cache_folder", "compiled", "compiled_inline", "compiled_views", "copy_scaled", "entry_point"]
 
 log = logging.getLogger(__name__)
+
+INTEGER, SCALAR, VECTOR, MATRIX = numba.int64, numba.float64, numba.float64[::1], numba.float64[:, ::1]
+"""Types of arguments, for `entry_point`: arrays are contiguous, in C order."""
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 _CONSTANT_IMPORT = re.compile(r"^from (\.+)([\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
@@ -126,6 +130,14 @@ def borrowed(_context: Any, array: Any) -> Any:
         return view._getvalue()
 
     return array(array), make
+
+
+def entry_point(function: Callable[..., Any], types: tuple[Any, ...]) -> Callable[..., Any]:
+    """Compiled code of a function for arguments of these types, without the dispatcher's look at each: half a call.
+
+    Nothing checks the arguments: an array of another type or order is read as if it were of this one.
+    """
+    return cast(Any, function).compile(types)
 
 
 def _jit(function: _F, **more: bool) -> _F:

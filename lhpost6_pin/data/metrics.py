@@ -14,6 +14,7 @@ import xarray as xr
 
 from ..core.arrays import Array
 from ..core.errors import RecordError
+from ..core.threads import by_threads
 from .at_rest import at_rest
 from .signals import Band, align, delay_within, rrmse
 
@@ -123,10 +124,11 @@ def track(record: xr.Dataset, quantity: str, *, errors: bool = True) -> list[Tra
     target = channel(record, f"reference_{quantity}") if known else np.full_like(achieved, np.nan)
     commanded = commanded_axes(record) if known and errors and len(achieved) >= FEWEST else []
     longest = min(LONGEST_DELAY, len(achieved) * step / 8.0)
-    found = []
-    for k, axis in enumerate(labels(record, "axis")):
+    names = labels(record, "axis")
+
+    def tracking(k: int) -> Tracking:
         whole, late, without, shifted = np.nan, np.nan, np.nan, None
-        if axis in commanded and np.isfinite(achieved[:, k]).all() and np.abs(target[:, k]).max() > SQUARED:
+        if names[k] in commanded and np.isfinite(achieved[:, k]).all() and np.abs(target[:, k]).max() > SQUARED:
             whole = float(rrmse(target[:, k], achieved[:, k]))
             late = float(delay_within(target[:, k], achieved[:, k], step, longest))
             shifted = align(achieved[:, k], late, step) if np.isfinite(late) else achieved[:, k]
@@ -134,8 +136,9 @@ def track(record: xr.Dataset, quantity: str, *, errors: bool = True) -> list[Tra
             if without > whole:  # the motion differs by more than a delay, as one that is cut off in full shaking
                 late, shifted, without = np.nan, achieved[:, k], whole
         wanted, reached = float(peaks(target[:, k])), float(peaks(achieved[:, k]))
-        found.append(Tracking(axis, k, quantity, wanted, reached, whole, late, without, shifted))
-    return found
+        return Tracking(names[k], k, quantity, wanted, reached, whole, late, without, shifted)
+
+    return list(by_threads(tracking, range(len(names))))
 
 
 def spool_use(record: xr.Dataset) -> list[SpoolUse]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core.errors import OutOfRangeError
 from ..core.rounding import rounded_down
+from ..core.threads import by_threads
 from .motion import AXES
 from .process import Target
 
@@ -282,9 +283,12 @@ def _demands(
 ) -> Iterator[Sequence[Demand]]:
     """Demands of some samples of a motion, scaled, part by part."""
     moved = [x[some] for x in (motion.displacement, motion.velocity, motion.acceleration)]
-    for block in sample_blocks(len(moved[0])):
+
+    def demands(block: slice) -> Sequence[Demand]:
         with np.errstate(all="ignore"):  # a pose beyond all reach exceeds every stroke: infinite
-            yield check(*(factor * x[block] for x in moved))
+            return check(*(factor * x[block] for x in moved))
+
+    return by_threads(demands, sample_blocks(len(moved[0])))
 
 
 def _deciding(motion: Motion, check: MotionCheck, factor: float, some: np.ndarray | slice = slice(None)) -> np.ndarray:

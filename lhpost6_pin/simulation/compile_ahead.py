@@ -9,14 +9,11 @@ import subprocess
 import sys
 from contextlib import suppress
 
-from numba import types
-from numba.core.types import Type
-
-from ..control.loop import control_packed
+from ..control.loop import CONTROL_TYPES, control_packed
 from ..core.compiled import cache_folder
 from ..core.garbage import collect_less
-from .engine_fused import log_packed
-from .engine_pinocchio import staggered_packed
+from .engine_fused import LOG_TYPES, log_packed
+from .engine_pinocchio import STAGGERED_TYPES, staggered_packed
 
 __all__ = ["SIGNATURES", "compile_ahead", "compile_step", "wait_for"]
 
@@ -24,15 +21,7 @@ LONGEST = 300.0
 """Time that the step is waited for [s]: several times what it takes on a slow machine."""
 
 
-def _arrays(*dimensions: int) -> tuple[Type, ...]:
-    return tuple(types.Array(types.float64, n, "C") for n in dimensions)
-
-
-SIGNATURES = {
-    control_packed: (types.int64, *_arrays(2, 1, 1, 1, 2, 2, 2)),
-    staggered_packed: (*_arrays(1), types.float64, *_arrays(1, 1, 1)),
-    log_packed: (types.int64, *_arrays(1, 2, 2, 2, 2, 2, 2)),
-}
+SIGNATURES = {control_packed: CONTROL_TYPES, staggered_packed: STAGGERED_TYPES, log_packed: LOG_TYPES}
 """What a step calls from Python, with the types of its arguments, in the order in which it is compiled: last what has
 parts in common with the equilibrium, which the first process compiles meanwhile."""
 

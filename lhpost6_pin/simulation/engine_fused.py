@@ -10,14 +10,14 @@ import numpy as np
 
 from ..control.loop import control_sample
 from ..core.arrays import Array
-from ..core.compiled import compiled, compiled_inline, copy_scaled
+from ..core.compiled import INTEGER, MATRIX, VECTOR, compiled, compiled_inline, copy_scaled
 from ..mechanics.forward_dynamics import platen_acceleration
 from ..mechanics.moving_parts import bodies_acceleration
 from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, rates_stage, staggered_stage
 from ..mechanics.spatial import integrate
 from ..mechanics.workspace import unpack_workspace
 
-__all__ = ["Log", "Signals", "Span", "log_packed", "run_fused"]
+__all__ = ["LOG_TYPES", "Log", "Signals", "Span", "log_packed", "run_fused"]
 
 
 class Span(NamedTuple):
@@ -150,6 +150,10 @@ def _log_sample(at, ws, window, log):
 def log_packed(at, buffer, window, q, v, a, z, spool):
     """`_log_sample` with workspace packed and the log as arrays, which are cheaper to pass from Python."""
     _log_sample(at, unpack_workspace(buffer), window, Log(q, v, a, z, spool))
+
+
+LOG_TYPES = INTEGER, VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX
+"""Types of the arguments of `log_packed`."""
 
 
 @compiled

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..core.arrays import Array
-from ..core.compiled import compiled_inline
+from ..core.compiled import MATRIX, SCALAR, VECTOR, compiled_inline, entry_point
 from ..core.names import SCHEMES
 from ..mechanics.derivatives import rates_at
 from ..mechanics.leg_model import Dynamics, make_dynamics
@@ -20,7 +20,7 @@ from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_
 from ..mechanics.tables import unpack_tables
 from ..mechanics.workspace import Workspace, unpack_workspace
 
-__all__ = ["Stepper", "make_stepper", "staggered_packed"]
+__all__ = ["STAGGERED_TYPES", "Stepper", "make_stepper", "staggered_packed"]
 
 Stepper = Callable[[Workspace, Array], int]
 """Advance a workspace over the model steps of one controller sample, spool (n_steps, nu); returns the stage status."""
@@ -46,11 +46,17 @@ def staggered_packed(q, dt, packed, buffer, spool):  # type: ignore[no-untyped-d
     return staggered_stage(q, dt, unpack_tables(packed), unpack_workspace(buffer), spool)
 
 
+STAGGERED_TYPES = VECTOR, SCALAR, VECTOR, VECTOR, VECTOR
+"""Types of the arguments of `staggered_packed`."""
+
+
 def _semi_implicit(plant: Plant, dt: float, forward: Dynamics | None) -> Stepper:
     model, packed, integrate = plant.model, plant.tables.packed, pin.integrate
     seen, armature = _joint_drag(plant, dt)
     damped = forward is None and bool(seen.any())
     accelerate = forward or make_dynamics(plant, armature if damped else None)
+    staggered = entry_point(staggered_packed, STAGGERED_TYPES)
+    close = kick if forward else entry_point(kick, (MATRIX, VECTOR, SCALAR))
 
     def advance(ws: Workspace, spool: Array) -> int:
         motion, buffer = ws.motion, ws.buffer
@@ -59,10 +65,10 @@ def _semi_implicit(plant: Plant, dt: float, forward: Dynamics | None) -> Stepper
         q, status = ws.q, 0
         for held in spool:
             q = integrate(model, q, dq)
-            status = staggered_packed(q, dt, packed, buffer, held)
+            status = staggered(q, dt, packed, buffer, held)
             if status:
                 break
-            kick(motion, accelerate(q, v_seen, tau + seen * motion[A] if damped else tau), dt)
+            close(motion, accelerate(q, v_seen, tau + seen * motion[A] if damped else tau), dt)
         ws.q[:] = q
         return status
 

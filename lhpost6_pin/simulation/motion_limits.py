@@ -17,6 +17,7 @@ import xarray as xr
 from ..core.arrays import Array
 from ..core.errors import OutOfRangeError
 from ..core.names import AXES
+from ..core.threads import by_threads
 from ..machine.machine import Machine
 from ..machine.strength import stated_strength
 from ..machine.structure import FLOW_READINGS
@@ -26,6 +27,7 @@ from ..mechanics.motion_demands import MotionDemands
 from ..mechanics.plant import Plant, make_plant
 from ..mechanics.pose import PlatenMotion
 from ..motions import (
+    Demand,
     LimitsSummary,
     MotionLimits,
     Peak,
@@ -132,11 +134,12 @@ def judge_motion(
     """
     bounds, check = _axis_limits(plant), MotionDemands(plant)
     fits = None if target is None else largest_scale(target, bounds, check)
-    demands = (
-        check(*(x[some] for x in motion), achieved=True, specimen=None if specimen is None else specimen[some])
-        for some in sample_blocks(len(motion.displacement))
-    )
-    return Judgement(limit_peaks(motion, replace(bounds, reserve=0.0), demands), fits)
+
+    def demands(some: slice) -> list[Demand]:
+        return check(*(x[some] for x in motion), achieved=True, specimen=None if specimen is None else specimen[some])
+
+    parts = by_threads(demands, sample_blocks(len(motion.displacement)))
+    return Judgement(limit_peaks(motion, replace(bounds, reserve=0.0), parts), fits)
 
 
 def judge_record(plant: Plant, record: xr.Dataset, *, fits: bool = True) -> Judgement | None:

@@ -16,9 +16,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..control.loop import ACTUATOR, AXIS, CANCELLER, control_packed, pack_control, sense_packed
+from ..control.loop import ACTUATOR, AXIS, CANCELLER, CONTROL_TYPES, control_packed, pack_control, sense_packed
 from ..control.plug import Feedback, start_plugged
 from ..core.arrays import Array
+from ..core.compiled import entry_point
 from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from ..core.progress import Progress
 from ..mechanics.derivatives import evaluate_derivatives
@@ -28,7 +29,7 @@ from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import Workspace, make_workspace
 from .coupling import Coupling, CouplingOptions, CouplingResult, make_coupling
 from .divergence import scheme_divergence
-from .engine_fused import Log, Signals, Span, log_packed, run_fused
+from .engine_fused import LOG_TYPES, Log, Signals, Span, log_packed, run_fused
 from .engine_pinocchio import make_stepper
 from .loops import ClosedLoop, Loop, OpenLoop, PluggedLoop, check_closed_loop, check_options, check_run
 from .snapshot import EVERY, Watch, take_snapshot
@@ -219,14 +220,14 @@ def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
     evaluated = coupled.evaluate if coupled else partial(evaluate_derivatives, plant)
     closed = not isinstance(job.loop, OpenLoop)
     window = job.spool if closed else np.zeros((span.steps, plant.spools))
-    spools = _spools_from(job)
+    spools, log = _spools_from(job), entry_point(log_packed, LOG_TYPES)
     clipped = 0
     for sample in range(span.last):
         if span.scheme != 0 and closed:
             evaluated(ws, window[0])  # the other schemes leave the ports of their last stage
         clipped += spools(sample, window)
         if sample % span.every == 0:
-            log_packed(sample // span.every, buffer, window, *job.log)
+            log(sample // span.every, buffer, window, *job.log)
         if job.look(sample):
             return _STOPPED, sample + 1, clipped
         status = advance(ws, window)
@@ -251,8 +252,8 @@ def _spools_from(job: _Job) -> Callable[[int, Array], int]:
 
         return recorded
     if isinstance(loop, ClosedLoop):
-        drive = np.ascontiguousarray(loop.drive, float)  # another type would be compiled anew
-        call, control, memory = control_packed, loop.controller.tables.packed, loop.controller.init()
+        drive, call = np.ascontiguousarray(loop.drive, float), entry_point(control_packed, CONTROL_TYPES)
+        control, memory = loop.controller.tables.packed, loop.controller.init()
 
         def compiled_loop(sample: int, window: Array) -> int:
             return int(call(sample, drive, packed, buffer, control, memory, command, window))

@@ -14,7 +14,7 @@ import pytest
 import lhpost6_pin
 from lhpost6_pin.control import controlled, load_controller
 from lhpost6_pin.core import compiled as module
-from lhpost6_pin.core.compiled import cache_folder, compiled
+from lhpost6_pin.core.compiled import VECTOR, borrowed, cache_folder, compiled, compiled_views, entry_point
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.simulation.compile_ahead import SIGNATURES
 from lhpost6_pin.simulation.simulate import ClosedLoop, simulate
@@ -176,3 +176,34 @@ def test_what_is_compiled_ahead_of_a_run_is_what_its_steps_call():
     simulate(plant, ClosedLoop(controller, drive, rest), samples=4)
     for function, signature in SIGNATURES.items():
         assert signature in function.signatures, function.__name__
+
+
+@compiled_views
+def _halves(values):  # type: ignore[no-untyped-def]
+    values = borrowed(values)
+    return values[: values.size // 2], values[values.size // 2 :].reshape((1, -1))
+
+
+@compiled
+def _swap_sums(values):  # type: ignore[no-untyped-def]
+    first, second = _halves(values)
+    first[0], second[0, 0] = second.sum(), first.sum()
+
+
+def test_views_of_a_borrowed_array_are_of_its_memory_and_do_not_free_it():
+    """The array keeps its only reference, whatever the number of calls: neither leaked nor freed."""
+    values, expected, held = np.arange(6.0), np.arange(6.0), []
+    for _ in range(3):
+        _swap_sums(values)
+        held.append(sys.getrefcount(values))
+        expected[0], expected[3] = expected[3:].sum(), expected[:3].sum()
+    assert held == [held[0]] * 3
+    np.testing.assert_array_equal(values, expected)
+
+
+def test_an_entry_point_gives_what_the_function_gives():
+    direct = entry_point(_swap_sums, (VECTOR,))
+    one, other = np.arange(6.0), np.arange(6.0)
+    direct(one)
+    _swap_sums(other)
+    np.testing.assert_array_equal(one, other)

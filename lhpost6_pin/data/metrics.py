@@ -169,6 +169,9 @@ def drift(record: xr.Dataset) -> tuple[Array, float, Array] | None:
 
 def peaks(values: Array) -> Array:
     """Greatest finite |value| of each column (n, ...) -> (...); not-a-number for a column without any."""
+    size = np.maximum(values.max(axis=0), -values.min(axis=0))  # not finite where a value is not
+    if np.isfinite(size).all():
+        return np.asarray(size)
     size = np.where(np.isfinite(values), np.abs(values), -np.inf).max(axis=0)
     return np.where(size >= 0.0, size, np.nan)
 

@@ -7,6 +7,7 @@ import xarray as xr
 
 from ..core.arrays import Array
 from ..core.names import AXES
+from ..core.threads import by_threads
 from ..motions.intensity_measures import IntensityMeasures, intensity_measures
 from ..motions.response_spectra import ResponseSpectrum, response_spectrum
 from .metrics import QUANTITIES, SQUARED, channel, commanded_axes, labels, sampling
@@ -49,7 +50,7 @@ def motion_measures(record: xr.Dataset) -> list[MotionMeasures]:
     """Measures of the commanded axes; without a target, of those that moved."""
     step = sampling(record)[1]
     periods = PERIODS[PERIODS >= 10.0 * step]  # peaks are taken at samples
-    return [_measures_of(record, axis, step, periods) for axis in commanded_axes(record)]
+    return list(by_threads(lambda axis: _measures_of(record, axis, step, periods), commanded_axes(record)))
 
 
 def _measures_of(record: xr.Dataset, axis: str, step: float, periods: Array) -> MotionMeasures:

@@ -1,0 +1,37 @@
+"""Work on parts by threads."""
+
+import threading
+
+import pytest
+
+from lhpost6_pin.core.threads import by_threads
+
+
+def test_results_come_in_the_order_of_the_parts():
+    waits = [threading.Event() for _ in range(2)]
+
+    def late(part: int) -> int:
+        """The first part waits for the second, where there are threads for both."""
+        if part == 1:
+            waits[1].set()
+        elif part == 0:
+            waits[1].wait(0.5)
+        return part
+
+    assert list(by_threads(late, range(6))) == list(range(6))
+    assert list(by_threads(late, [])) == []
+
+
+def test_the_error_of_a_part_is_raised():
+    def failing(part: int) -> int:
+        if part == 3:
+            raise ValueError("part 3")
+        return part
+
+    with pytest.raises(ValueError, match="part 3"):
+        list(by_threads(failing, range(5)))
+
+
+def test_one_processor_works_without_threads(monkeypatch):
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0})
+    assert list(by_threads(lambda _: threading.current_thread().name, range(2))) == ["MainThread"] * 2

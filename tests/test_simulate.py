@@ -238,7 +238,7 @@ def test_a_run_that_diverges_prints_and_reports_no_table_and_no_remark(plant, re
     target = make_target(find_motion("sine", amplitude=0.05, cycles=1), axes="x")
     options = {"scheme": "euler", "steps_per_second": SAMPLE_RATE, "engine": "fused"}
     test = rehearse(load_machine(), target, load_controller("lhpost6"), attrs={}, **options)
-    assert test.run.diverged and not run_remarks(test.run)
+    assert test.run.diverged and not run_remarks(test)
     print_run(test.run, write_test_report(test.run.plant, test.record, None, notes_of_run(test.run, [])))
     printed = " ".join(capsys.readouterr().out.split())
     assert "diverged before" in printed and "Peak" not in printed and "capacity" not in printed

@@ -291,7 +291,7 @@ def save_run(
     path = None if RUN_FILES[1] in leave_out else files[-1]
     if RUN_FILES[0] not in leave_out:
         save_record(thinned(record, record_every), folder / RUN_FILES[0], single=True)
-    remarks = run_remarks(done)
+    remarks = run_remarks(test)
     for remark in remarks:
         log.warning("%s", remark)
     notes, command = [*notes, *notes_of_run(done, remarks)], repeating_command()

@@ -5,10 +5,13 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-__all__ = ["by_threads"]
+__all__ = ["by_threads", "fill_by_threads", "row_blocks"]
 
 _MOST = 4
 """Threads beyond which what the interpreter does between compiled parts takes longer than these."""
+
+_ROWS = 8192
+"""Rows of a block: what is made of them stays in the processor's cache."""
 
 _P = TypeVar("_P")
 _R = TypeVar("_R")
@@ -22,3 +25,14 @@ def by_threads(function: Callable[[_P], _R], parts: Sequence[_P]) -> Iterator[_R
         return
     with ThreadPoolExecutor(count) as pool:
         yield from pool.map(function, parts)
+
+
+def row_blocks(rows: int) -> list[slice]:
+    """Consecutive parts of an array of so many rows, each with its start and stop."""
+    return [slice(at, min(at + _ROWS, rows)) for at in range(0, rows, _ROWS)]
+
+
+def fill_by_threads(fill: Callable[[slice], object], rows: int) -> None:
+    """Call a function that fills a block of rows of its arrays for all blocks of so many rows."""
+    for _ in by_threads(fill, row_blocks(rows)):
+        pass

@@ -13,6 +13,7 @@ from ..core.arrays import Array
 from ..core.cholesky import solve_positive
 from ..core.compiled import compiled, compiled_inline
 from ..core.errors import RecordError
+from ..core.threads import fill_by_threads
 from .plant import Plant
 from .ports import evaluate_ports, platen_pose
 from .spatial import (
@@ -73,7 +74,12 @@ def platen_motion(plant: Plant, q: Array, v: Array, a: Array) -> PlatenMotion:
     """Motion of C and Euler angles, each (n, 6), from a plant's q (n, nq), v (n, nv), a (n, nv) (Eqs. 3-11, 3-18)."""
     motion = PlatenMotion(*np.zeros((3, len(q), 6)))
     moved = PlantMotion(*(np.ascontiguousarray(x, float) for x in (q, v, a)))
-    _platen_motion(moved, plant.axes, plant.body, motion)
+
+    def fill(rows: slice) -> None:
+        some, out = PlantMotion(*(x[rows] for x in moved)), PlatenMotion(*(x[rows] for x in motion))
+        _platen_motion(some, plant.axes, plant.body, out)
+
+    fill_by_threads(fill, len(q))
     return motion
 
 
@@ -295,7 +301,11 @@ def leg_displacements(plant: Plant, displacement: Array, velocity: Array | None 
     pose = np.ascontiguousarray(np.atleast_2d(displacement), float)
     speed = np.zeros_like(pose) if velocity is None else np.ascontiguousarray(np.atleast_2d(velocity), float)
     out, rates = np.zeros((len(pose), plant.legs.size)), np.zeros((len(pose), plant.legs.size))
-    _lengths(pose, plant.legs, plant.body, len(plant.ports), out, rates, speed)
+
+    def fill(rows: slice) -> None:
+        _lengths(pose[rows], plant.legs, plant.body, len(plant.ports), out[rows], rates[rows], speed[rows])
+
+    fill_by_threads(fill, len(pose))
     return out, rates
 
 

@@ -13,7 +13,6 @@ from .limits import (
     check_limits,
     largest_scale,
     limit_peaks,
-    sample_blocks,
 )
 from .motion import AXES, GroundMotion, make_motion
 from .motion_options import MotionOption
@@ -55,7 +54,6 @@ __all__ = [
     "motion_options",
     "required_spectrum",
     "response_spectrum",
-    "sample_blocks",
     "smooth_step",
     "spectrum_errors",
     "with_rotation",

@@ -1,6 +1,6 @@
 """Demand of a target over the capacity of the table, and the largest scale within it."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -8,18 +8,17 @@ import numpy as np
 
 from ..core.errors import OutOfRangeError
 from ..core.rounding import rounded_down
-from ..core.threads import by_threads
+from ..core.threads import by_threads, row_blocks
 from .motion import AXES
 from .process import Target
 
 __all__ = ["SI", "Demand", "LimitsSummary", "MotionCheck", "MotionLimits", "Peak", "Units", "check_limits"]
-__all__ += ["largest_scale", "less_reserve", "limit_peaks", "sample_blocks"]
+__all__ += ["largest_scale", "less_reserve", "limit_peaks"]
 
 _QUANTITIES = ("displacement", "velocity", "acceleration")
 _FULL = 1 + 1e-6  # a motion exactly at the limit passes despite rounding
 _CLOSE = 1e-4  # relative width to which the largest scale is bracketed
 _STRIDE = 8  # samples of which one is looked at first: 4 ms of a target, within which its demands hardly change
-_BLOCK = 4096  # samples that are looked at at once: their demands stay in the processor's cache
 _GOVERNING = 0.5  # of the largest share: samples with as much are looked at first, as demands are nearly linear
 
 
@@ -62,6 +61,9 @@ def less_reserve(share: float) -> str:
 
 MotionCheck = Callable[[np.ndarray, np.ndarray, np.ndarray], Sequence[Demand]]
 """From displacement, velocity and acceleration (n, 6) of a motion to its demands on a table, sample by sample."""
+
+PartCheck = Callable[[slice], Sequence[Demand]]
+"""From consecutive samples of a motion to their demands on a table."""
 
 
 Units = Mapping[str, tuple[str, float]]
@@ -126,7 +128,7 @@ def check_limits(
     limit, time and sample, and the names of the others. Of a target that has no scale for its user, `size` gives
     the words behind "The largest" for a scale, as "--amplitude that fits is 0.36m".
     """
-    peaks = limit_peaks(target, limits, _demands(target, check) if check else (), units)
+    peaks = limit_peaks(target, limits, _parts_of(target, check) if check else None, units)
     over = [peak for peak in peaks if peak.decides and peak.utilisation > _FULL]
     if over:
         fits = largest_scale(target, limits, check)
@@ -190,44 +192,43 @@ def _bracketed(target: Target, check: MotionCheck, high: float, share: float, go
     return low
 
 
-def sample_blocks(samples: int) -> list[slice]:
-    """Consecutive parts of a motion, in which its demands are evaluated."""
-    return [slice(at, at + _BLOCK) for at in range(0, samples, _BLOCK)]
-
-
 def limit_peaks(
-    motion: Motion, limits: MotionLimits, demands: Iterable[Sequence[Demand]] = (), units: Units = SI
+    motion: Motion, limits: MotionLimits, demands: PartCheck | None = None, units: Units = SI
 ) -> tuple[Peak, ...]:
     """Largest demand of a motion on every limit, axes before others, with texts in `units`; nothing is refused.
 
-    demands: those of its consecutive parts on the table (`sample_blocks`).
+    demands: those of parts of the motion on the table.
     """
-    largest: list[_Largest] = []
-    start = 0
-    for block in demands:
-        largest = largest or [_Largest(demand) for demand in block]
-        for so_far, demand in zip(largest, block, strict=True):
-            so_far.add(demand, start)
-        start += len(block[0].share) if block else 0
-    return (*_axis_peaks(motion, limits, units), *(peak for found in largest for peak in found.peaks(units)))
+    on_axes = _axis_peaks(motion, limits, units)
+    if demands is None:
+        return tuple(on_axes)
+
+    def largest(block: slice) -> list[_Largest]:
+        return [_Largest(demand, block.start) for demand in demands(block)]
+
+    first, *others = by_threads(largest, row_blocks(len(motion.displacement)))
+    for block in others:
+        for so_far, found in zip(first, block, strict=True):
+            so_far.raise_to(found)
+    return (*on_axes, *(peak for found in first for peak in found.peaks(units)))
 
 
 class _Largest:
-    """Largest share of each axis, actuator or part in the parts of a motion seen so far, and where it is."""
+    """Largest share of each axis, actuator or part in a part of a motion that begins at sample `start`."""
 
-    def __init__(self, demand: Demand) -> None:
-        count = len(demand.names)
-        self._demand = demand
-        self._share, self._sample, self._value = np.full(count, -1.0), np.zeros(count, int), np.zeros(count)
-
-    def add(self, demand: Demand, start: int) -> None:
-        """Take in the demand of a part that begins at sample `start`."""
-        shares, each = _magnitudes(demand.share), np.arange(len(self._share))
+    def __init__(self, demand: Demand, start: int) -> None:
+        shares, each = _magnitudes(demand.share), np.arange(len(demand.names))
         at = np.argmax(shares, axis=0)
-        higher = shares[at, each] > self._share
-        self._share[higher], self._sample[higher] = shares[at, each][higher], start + at[higher]
-        if demand.value is not None:
-            self._value[higher] = demand.value[at, each][higher]
+        self._demand, self._share, self._sample = demand, shares[at, each], start + at
+        self._value = np.zeros(len(each)) if demand.value is None else demand.value[at, each]
+
+    def raise_to(self, other: "_Largest") -> None:
+        """Take what is larger in another part."""
+        higher = other._share > self._share
+        for mine, theirs in zip(
+            (self._share, self._sample, self._value), (other._share, other._sample, other._value), strict=True
+        ):
+            mine[higher] = theirs[higher]
 
     def peaks(self, units: Units) -> list[Peak]:
         """One per axis, actuator or part, with texts in `units`."""
@@ -278,33 +279,35 @@ def _axis_peaks(target: Motion, limits: MotionLimits, units: Units = SI) -> list
     return peaks
 
 
-def _demands(
+def _parts_of(
     motion: Motion, check: MotionCheck, factor: float = 1.0, some: np.ndarray | slice = slice(None)
-) -> Iterator[Sequence[Demand]]:
-    """Demands of some samples of a motion, scaled, part by part."""
+) -> PartCheck:
+    """Demands of parts of some samples of a motion, scaled."""
     moved = [x[some] for x in (motion.displacement, motion.velocity, motion.acceleration)]
 
     def demands(block: slice) -> Sequence[Demand]:
         with np.errstate(all="ignore"):  # a pose beyond all reach exceeds every stroke: infinite
             return check(*(factor * x[block] for x in moved))
 
-    return by_threads(demands, sample_blocks(len(moved[0])))
+    return demands
 
 
 def _deciding(motion: Motion, check: MotionCheck, factor: float, some: np.ndarray | slice = slice(None)) -> np.ndarray:
     """Largest share (n,) of the deciding demands at each of some samples of a motion, scaled."""
-    largest = [np.zeros(0)]
-    for demands in _demands(motion, check, factor, some):
-        shares = [np.abs(demand.share).max(axis=1) for demand in demands if demand.decides]
-        if not shares:
-            return np.zeros(len(motion.displacement[some]))
-        largest.append(_magnitudes(np.max(shares, axis=0)))
-    return np.concatenate(largest)
+    demands, count = _parts_of(motion, check, factor, some), len(motion.displacement[some])
+
+    def largest(block: slice) -> np.ndarray:
+        shares = [np.abs(demand.share).max(axis=1) for demand in demands(block) if demand.decides]
+        return _magnitudes(np.max(shares, axis=0)) if shares else np.zeros(block.stop - block.start)
+
+    return np.concatenate([np.zeros(0), *by_threads(largest, row_blocks(count))])
 
 
 def _magnitudes(shares: np.ndarray) -> np.ndarray:
     """Magnitudes of shares; infinite where they are not numbers."""
-    return np.nan_to_num(np.abs(shares), nan=np.inf, posinf=np.inf)
+    found = np.abs(shares)
+    found[np.isnan(found)] = np.inf
+    return found
 
 
 def _round_down(value: float) -> float:

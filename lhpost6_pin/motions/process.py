@@ -19,6 +19,7 @@ import numpy as np
 
 from ..core.errors import MotionError
 from ..core.files import models_folder
+from ..core.threads import by_threads
 from .joins import join_warning, sharp_joins
 from .lost_peaks import lost_peaks
 from .motion import AXES, GroundMotion
@@ -199,9 +200,8 @@ def make_target(
     size, angular = int(total * step), 2 * np.pi * frequency
     moved = np.isin(AXES, [axis for axis, _ in pairs])
     series = series[:, moved]  # the other axes stay at rest
-    d, v, a = (
-        _evaluate(series * factor, total, size)[begin : begin + count] for factor in (1.0, 1j * angular, -(angular**2))
-    )
+    factors = 1.0, 1j * angular, -(angular**2)
+    d, v, a = by_threads(lambda factor: _evaluate(series * factor, total, size)[begin : begin + count], factors)
     w, w1, w2 = _rest_window(count, lead, rate)
     displacement, velocity, acceleration = motion_of_axes = np.zeros((3, count, len(AXES)))
     motion_of_axes[:, :, moved] = w * d, w1 * d + w * v, w2 * d + 2 * w1 * v + w * a

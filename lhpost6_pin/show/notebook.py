@@ -92,7 +92,7 @@ def _recorded_machine(record: xr.Dataset) -> Machine | None:
 
 @_write.register
 def _(result: SimulatedTest, path: Path) -> Any:
-    return write_test_report(result.run.plant, result.record, path, notes_of_run(result.run, run_remarks(result.run)))
+    return write_test_report(result.run.plant, result.record, path, notes_of_run(result.run, run_remarks(result)))
 
 
 @_write.register

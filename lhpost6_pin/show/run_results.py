@@ -5,10 +5,12 @@ from pathlib import Path
 
 import xarray as xr
 
+from ..data.metrics import channel
 from ..mechanics.plant import Plant
 from ..mechanics.specimen_joints import joints_beyond, specimen_doubts
 from ..simulation.coupling import DOUBTFUL
 from ..simulation.limit_use import plant_limits
+from ..simulation.rehearse import SimulatedTest
 from ..simulation.simulate import Run
 from ..simulation.trouble import run_doubts
 from ..tuning.interaction import Interaction
@@ -19,11 +21,13 @@ from .tables import machine_rows
 __all__ = ["notes_of_run", "run_remarks", "write_test_report"]
 
 
-def run_remarks(run: Run) -> list[str]:
+def run_remarks(test: SimulatedTest) -> list[str]:
     """Remarks on a run that has not diverged: joints beyond their limits, low pressures, ends of strokes."""
+    run, record = test
     if run.diverged:
         return []
-    return [*joints_beyond(run.plant, run.time, run.q), *run_doubts(run)]
+    joints = joints_beyond(run.plant, run.time, run.q)
+    return [*joints, *run_doubts(run, channel(record, "platen_displacement"))]
 
 
 def notes_of_run(run: Run, remarks: Sequence[str]) -> list[str]:

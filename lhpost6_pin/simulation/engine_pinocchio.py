@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..core.arrays import Array
-from ..core.compiled import MATRIX, SCALAR, VECTOR, compiled_inline, entry_point
+from ..core.compiled import INTEGER, MATRIX, SCALAR, VECTOR, compiled_inline, entry_point
 from ..core.names import SCHEMES
 from ..mechanics.derivatives import rates_at
 from ..mechanics.leg_model import Dynamics, make_dynamics
@@ -41,12 +41,12 @@ def make_stepper(plant: Plant, scheme: str, dt: float, forward: Dynamics | None 
 
 
 @compiled_inline
-def staggered_packed(q, dt, packed, buffer, spool):  # type: ignore[no-untyped-def]
-    """`staggered_stage` with tables and workspace packed, which are cheaper to pass."""
-    return staggered_stage(q, dt, unpack_tables(packed), unpack_workspace(buffer), spool)
+def staggered_packed(q, dt, packed, buffer, window, step):  # type: ignore[no-untyped-def]
+    """`staggered_stage` of a step of a sample with tables, workspace and spools packed, which are cheaper to pass."""
+    return staggered_stage(q, dt, unpack_tables(packed), unpack_workspace(buffer), window[step])
 
 
-STAGGERED_TYPES = VECTOR, SCALAR, VECTOR, VECTOR, VECTOR
+STAGGERED_TYPES = VECTOR, SCALAR, VECTOR, VECTOR, MATRIX, INTEGER
 """Types of the arguments of `staggered_packed`."""
 
 
@@ -57,15 +57,16 @@ def _semi_implicit(plant: Plant, dt: float, forward: Dynamics | None) -> Stepper
     accelerate = forward or make_dynamics(plant, armature if damped else None)
     staggered = entry_point(staggered_packed, STAGGERED_TYPES)
     close = kick if forward else entry_point(kick, (MATRIX, VECTOR, SCALAR))
+    start = entry_point(open_step, (MATRIX, SCALAR))
 
     def advance(ws: Workspace, spool: Array) -> int:
         motion, buffer = ws.motion, ws.buffer
         dq, v_seen, tau = motion[DQ], motion[V_SEEN], motion[TAU]
-        open_step(motion, dt)  # no change after a kick
+        start(motion, dt)  # no change after a kick
         q, status = ws.q, 0
-        for held in spool:
+        for step in range(len(spool)):
             q = integrate(model, q, dq)
-            status = staggered(q, dt, packed, buffer, held)
+            status = staggered(q, dt, packed, buffer, spool, step)
             if status:
                 break
             close(motion, accelerate(q, v_seen, tau + seen * motion[A] if damped else tau), dt)

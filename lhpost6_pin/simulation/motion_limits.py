@@ -17,7 +17,6 @@ import xarray as xr
 from ..core.arrays import Array
 from ..core.errors import OutOfRangeError
 from ..core.names import AXES
-from ..core.threads import by_threads
 from ..machine.machine import Machine
 from ..machine.strength import stated_strength
 from ..machine.structure import FLOW_READINGS
@@ -36,7 +35,6 @@ from ..motions import (
     check_limits,
     largest_scale,
     limit_peaks,
-    sample_blocks,
 )
 from ..motions.limits import SI, Units
 
@@ -138,8 +136,7 @@ def judge_motion(
     def demands(some: slice) -> list[Demand]:
         return check(*(x[some] for x in motion), achieved=True, specimen=None if specimen is None else specimen[some])
 
-    parts = by_threads(demands, sample_blocks(len(motion.displacement)))
-    return Judgement(limit_peaks(motion, replace(bounds, reserve=0.0), parts), fits)
+    return Judgement(limit_peaks(motion, replace(bounds, reserve=0.0), demands), fits)
 
 
 def judge_record(plant: Plant, record: xr.Dataset, *, fits: bool = True) -> Judgement | None:

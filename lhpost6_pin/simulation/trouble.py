@@ -108,8 +108,11 @@ def _unphysical(chamber: _Chamber, at: float) -> str:
     return f"{what}; {_REMEDY.format(more=_WITH if chamber.vapour else _WITHOUT)}"
 
 
-def run_doubts(run: Run) -> list[str]:
-    """Remarks on a run: chambers below the return pressure, strokes that reached their ends."""
+def run_doubts(run: Run, displacement: Array | None = None) -> list[str]:
+    """Remarks on a run: chambers below the return pressure, strokes that reached their ends.
+
+    displacement (n, 6): that of C and Euler angles in this run, where it is known.
+    """
     low, found = float(run.plant.supply[1]), []
     empty = {one.chamber.place: one for one in _lowest(run, 0.0)}
     for one in _lowest(run, low):
@@ -119,7 +122,8 @@ def run_doubts(run: Run) -> list[str]:
         if 0.0 <= least < chamber.vapour:
             lifts = f", and {chamber.actuator.name}, which cannot pull, hardly bears on the platen" * chamber.bears
             found[-1] += f"; its oil cavitates below {chamber.vapour / 1e6:.3g} MPa{lifts}"
-    displacement = platen_motion(run.plant, run.q, run.v, run.a).displacement
+    if displacement is None:
+        displacement = platen_motion(run.plant, run.q, run.v, run.a).displacement
     for end in stroke_ends(run.plant, run.time, displacement):
         actuator = next(a for a in run.plant.machine.actuators if a.name == end.actuator)
         bumper = "its elastic bumper, whose numbers are assumed, acts there"

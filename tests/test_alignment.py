@@ -59,6 +59,25 @@ def test_the_standard_error_is_that_of_repeated_noise():
     assert abs(tau.mean()) < 5 * tau.std() / np.sqrt(40)
 
 
+@pytest.mark.parametrize("seconds", [1.5, 3, 11, 25])
+def test_noise_determines_no_delay(seconds: float):
+    """Of 500 pairs of unlike noise none or one is coherent, where one in 20,000 sets of frequencies is by chance."""
+    pairs = np.random.default_rng(1).standard_normal((2, round(512 * seconds), 500))
+    delay, error = phase_delay(*pairs, 1 / 512)
+    assert np.isinf(error).sum() >= 499 and np.all(delay[np.isinf(error)] == 0.0)
+
+
+def test_a_delay_of_a_signal_under_its_noise_is_as_uncertain_as_stated():
+    """Slow motion in white noise: of 300 pairs, less than 2 % lie beyond four stated errors."""
+    rng = np.random.default_rng(2)
+    true = 0.05 * np.cumsum(rng.standard_normal((5632, 300)), axis=0)  # 11 s
+    for noise in (0.25, 2.5):  # 5 and 50 times its change in a sample
+        measured = np.roll(true, 2, axis=0) + noise * rng.standard_normal(true.shape)
+        delay, error = phase_delay(true, measured, 1 / 512)
+        known = np.isfinite(error)
+        assert known.any() and np.mean(np.abs(delay - 2 / 512)[known] > 4 * error[known]) < 0.02
+
+
 def test_a_silent_channel_has_no_delay_and_an_infinite_error():
     found, error = phase_delay(waves(T, np.ones(1), 0)[0], np.zeros((len(T), 1)), DT)
     assert np.isinf(error[0])

@@ -40,6 +40,10 @@ __all__ = [
 
 
 SEGMENT = 2.0  # s: of Welch's average, Hann windows
+FEWEST = 2.5  # segments: of shorter records they are shorter, as one alone is coherent with anything
+NEIGHBOURS = 7  # frequencies whose coherence is judged together
+RIVAL = 8.0  # of the logarithm of the likelihood: another delay as much less likely is excluded
+BY_CHANCE = 4.0  # times the mean evidence for coherence of unlike noise: seven together exceed it once in 20,000
 LEAKAGE = 1e-6  # of the largest power: below it a spectrum may show the window's side lobes
 MOST = 1 - 1e-4  # coherence: gains and geometry that are off by 1 % make two channels as unlike as this
 BAND = Band(2.0, 40.0)  # its corners [Hz] bound the frequencies that count; the lower is wide of the window's lobe
@@ -59,13 +63,14 @@ def phase_delay(reference: ArrayLike, signal: ArrayLike, dt: float, band: Band =
 
     The phase of Welch's cross-spectrum has variance (1 - C) / (2 m C) at coherence C over m segments; its slope
     through zero frequency is the least-squares one with these weights, m counted as segments that do not overlap.
-    Gains and offsets do not matter. The error is infinite where nothing is coherent. A delay beyond a tenth of a
-    segment is not found: `signals.delay` does that.
+    Gains and offsets do not matter. Frequencies that are no more coherent than unlike noise is by chance do not count,
+    and the error is infinite where none is: each of them would determine a delay by its own phase. A delay beyond a
+    tenth of a segment is not found: `signals.delay` does that.
     """
     from scipy import signal as sp
 
     ref, sig = (np.asarray(x, dtype=float).reshape(len(np.asarray(x)), -1) for x in (reference, signal))
-    length = min(len(ref), round(SEGMENT / dt))
+    length = min(round(len(ref) / FEWEST), round(SEGMENT / dt))
     if length < 2:  # too slow a record to resolve any frequency
         return np.zeros(ref.shape[1]), np.full(ref.shape[1], np.inf)
     each = {"fs": 1 / dt, "nperseg": length, "axis": 0}
@@ -78,27 +83,48 @@ def phase_delay(reference: ArrayLike, signal: ArrayLike, dt: float, band: Band =
     power = np.where(power > LEAKAGE**2 * power.max(axis=0), power, 0.0)
     m = len(ref) / length
     coherence = np.divide(np.abs(cross) ** 2, power, out=np.zeros_like(power), where=power > 0)
+    by_chance = _by_chance(np.minimum(coherence, MOST), (len(ref) - length // 2) // (length - length // 2))
     if m > 1:
         coherence = np.clip((m * coherence - 1) / (m - 1), 0.0, 1.0)  # without the estimate's bias
     coherence = np.minimum(coherence, MOST)
-    weight = 2 * m * coherence / (1 - coherence)
-    delay = _coarse(cross, weight, omega)
-    phase = -np.angle(cross * np.exp(1j * omega * delay))
+    weight = np.where(by_chance, 0.0, 2 * m * coherence / (1 - coherence))
     information = np.sum(weight * omega**2, axis=0)
-    known = information > 0
+    error = np.divide(1.0, np.sqrt(information), out=np.full(len(information), np.inf), where=information > 0)
+    delay, known = _coarse(cross, weight, omega, error)
+    phase = -np.angle(cross * np.exp(1j * omega * delay))
     step = np.divide(np.sum(weight * omega * phase, axis=0), information, out=np.zeros(len(known)), where=known)
-    error = np.divide(1.0, np.sqrt(information), out=np.full(len(known), np.inf), where=known)
-    return delay + step, error
+    return np.where(known, delay + step, 0.0), np.where(known, error, np.inf)
 
 
-def _coarse(cross: NDArray[np.complex128], weight: Array, omega: Array) -> Array:
-    """Delay (k,) on a grid at which the weighted phases agree best, so that no phase is wrapped."""
+def _by_chance(coherence: Array, segments: int) -> NDArray[np.bool_]:
+    """Whether unlike noise might be as coherent over so many segments, by frequency and column.
+
+    Of noise, -(K - 1) log(1 - C) is distributed exponentially with mean one (K segments; those of Hann windows that
+    overlap by half are nearly independent); it is averaged over neighbours in frequency.
+    """
+    from scipy.ndimage import uniform_filter1d
+
+    evidence = -(segments - 1) * np.log1p(-coherence)
+    return np.asarray(uniform_filter1d(evidence, NEIGHBOURS, axis=0, mode="constant", cval=1.0) < BY_CHANCE)
+
+
+def _coarse(
+    cross: NDArray[np.complex128], weight: Array, omega: Array, error: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Delay (k,) on a grid at which the weighted phases agree best, so that no phase is wrapped; whether it is known.
+
+    It is not where another delay, farther off than four errors, explains the phases nearly as well.
+    """
     top = float(omega[-1, 0])
     grid = np.arange(-0.1 * SEGMENT, 0.1 * SEGMENT, 0.5 / top)
     turned = np.exp(1j * omega * grid)  # (f, grid)
     size = np.abs(cross)
     unit = np.divide(cross, size, out=np.zeros_like(cross), where=size > 0)
-    return grid[np.argmax((turned.T @ (weight * unit)).real, axis=0)]
+    likelihood = (turned.T @ (weight * unit)).real  # its logarithm, (grid, k)
+    delay = grid[np.argmax(likelihood, axis=0)]
+    apart = np.abs(grid[:, None] - delay) > 4 * error + 0.5 / top
+    rival = np.where(apart, likelihood, -np.inf).max(axis=0)
+    return delay, np.isfinite(error) & (likelihood.max(axis=0) - rival > RIVAL)
 
 
 def slow_delay(reference: ArrayLike, signal: ArrayLike, dt: float, high: float = 20.0) -> tuple[Array, Array]:

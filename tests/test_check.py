@@ -348,3 +348,34 @@ def test_lengths_of_turned_sign_or_in_a_wrong_unit_contradict_the_pose(tests):
         assert found is not None
         (words,) = (words for words in found.contradictions if words.startswith(f"{length}[H2]: "))
         assert remedy in words and f"gain {factor:.2g}" in words
+
+
+@pytest.mark.parametrize("factor", [39.37, 1 / 25.4])
+def test_a_displacement_in_a_wrong_unit_is_named_and_not_the_channels_that_disagree_with_it(tests, factor: float):
+    wrong = tests["EQ"].copy(deep=True)
+    wrong["platen_displacement"] *= factor
+    found = campaign_check.check_campaign(MACHINE, [wrong], "lhpost6")
+    assert found is not None
+    (words,) = found.contradictions
+    assert words.startswith("platen_displacement: actuator_displacement (gain ") and "platen_acceleration" in words
+    assert words.endswith("disagree with it alike: correct its unit or factor in the channel map, and import again")
+
+
+def test_pressures_in_a_wrong_unit_leave_it_open_whether_forces_are(tests):
+    wrong = tests["EQ"].copy(deep=True)
+    for name in ("chamber_pressure_a", "chamber_pressure_b"):
+        wrong[name] *= 1e3
+    found = campaign_check.check_campaign(MACHINE, [wrong], "lhpost6")
+    assert found is not None
+    (words,) = found.contradictions
+    assert re.match(
+        r"actuator_force: force against pressures: gain 0.00100\d*: its unit or factor, or that of chamb", words
+    )
+
+
+def test_a_spool_in_per_cent_is_a_matter_of_its_unit_and_not_of_the_test(tests):
+    percent = tests["EQ"].copy(deep=True)
+    percent["spool_position"] *= 100.0
+    words = [str(finding) for finding in check_dataset(percent, MACHINE) if "spool_position" in finding.channel]
+    assert any("V or % for the share of full stroke?" in one for one in words)
+    assert not any("reduce the scale" in one for one in words)

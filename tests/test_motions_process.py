@@ -237,6 +237,19 @@ def test_legs_limit_the_scale_although_their_length_is_not_linear_in_the_pose():
     assert check_limits(with_scale(target, fits), WIDE, leg_across).utilisation["actuator stroke"]["H1"] <= 1
 
 
+def test_what_exceeds_a_limit_at_rest_fits_at_no_scale_and_says_so():
+    target, looks = make_target(find_motion("sine", amplitude=0.5, period=2.0)), []
+
+    def check(displacement: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> list[Demand]:
+        looks.append(len(displacement))
+        return [Demand("platen strength", ("z up",), 1.3 + np.abs(velocity[:, :1]), "of its strength")]
+
+    with pytest.raises(OutOfRangeError, match="at any scale, as what is mounted does at rest: z up platen .* 130 %"):
+        check_limits(target, WIDE, check)
+    assert largest_scale(target, WIDE, check) == 0.0
+    assert sum(looks) < 1.1 * len(target.time)
+
+
 @pytest.mark.parametrize("weight", [0.0, 0.5, 0.9])
 def test_a_demand_with_a_static_part_limits_the_scale_although_another_one_is_larger_at_first(weight):
     """Closed form: |x| s <= 1 and weight + |v| s / 9 <= 1, whose samples are others; rounded down to three digits."""

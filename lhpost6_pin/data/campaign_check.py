@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
+import numpy as np
 import xarray as xr
 
 from ..core.errors import RecordError
@@ -17,6 +19,7 @@ from .noise_levels import noise_levels
 from .observable import Observable, observable
 from .records import is_measured
 from .rests import restless
+from .sensor_pairs import counterpart
 from .sensors import SensorSet, load_sensors, make_sensors
 from .served_samples import part_compared
 from .turned_displacement import turned_displacement
@@ -28,6 +31,8 @@ WRONG = 1.5
 
 DEAD = 1e-9
 """Gain over what it should be below which a sensor shows nothing of what the others do: no unit is that wrong."""
+
+_AGAIN = "in the channel map, and import again"
 
 UNEVEN = 2.0  # a column is that much noisier than those like it: a loose cable rather than a worse sensor
 
@@ -49,20 +54,16 @@ class CampaignCheck:
     @property
     def contradictions(self) -> tuple[str, ...]:
         """Redundant sensors of which one is turned, or wrong by a factor: by their gain, with what to correct."""
-        gains = [f for f in self.findings or () if f.quantity.startswith("gain") and f.verdict == "suspicious"]
-        found = []
-        for one in gains:
-            ratio, again = one.estimate / one.expected, "in the channel map, and import again"
-            remedy = ""
-            if abs(ratio) < DEAD:
-                remedy = "it does not respond; mend the sensor"
-            elif ratio < 0.0:
-                remedy = f"turned; correct its sign {again}"
-            elif max(ratio, 1.0 / ratio) > WRONG:
-                remedy = f"correct its unit or factor {again}"
-            if remedy:
-                found.append(f"{one.channel}: {one.check}: gain {one.estimate:.4g}: {remedy}")
-        return tuple(found)
+        gains = [f for f in self.findings or () if f.quantity.startswith("gain") and f.verdict != "untested"]
+        by_check = groupby(gains, lambda one: (one.check, _channel_of(one)))
+        alone, alike = list[str](), dict[str, list[tuple[ConsistencyFinding, ...]]]()
+        for (check, _), ones in ((key, tuple(ones)) for key, ones in by_check):
+            other = counterpart(check)
+            if other and _off_alike(ones):
+                alike.setdefault(other, []).append(ones)
+            else:
+                alone += [words for one in ones if one.verdict == "suspicious" and (words := _gain_off(one))]
+        return *(_unit_off(other, groups) for other, groups in alike.items()), *alone
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -76,6 +77,48 @@ class CampaignCheck:
             if one.uneven > UNEVEN
         ]
         return tuple([*found, self.reason] if self.reason else found)
+
+
+def _channel_of(finding: ConsistencyFinding) -> str:
+    """Channel of a finding without its column."""
+    return finding.channel.partition("[")[0]
+
+
+def _factor(finding: ConsistencyFinding) -> float:
+    """What a gain is over what it should be."""
+    return finding.estimate / finding.expected
+
+
+def _off_alike(gains: Sequence[ConsistencyFinding]) -> bool:
+    """Whether all gains are off by about the same factor: a unit, of this channel or of what it is compared with."""
+    factors = [_factor(one) for one in gains]
+    least, most = min(factors), max(factors)
+    return least > DEAD and most < WRONG * least and (most < 1.0 / WRONG or least > WRONG)
+
+
+def _unit_off(other: str, groups: Sequence[Sequence[ConsistencyFinding]]) -> str:
+    """What to correct where each of these groups of gains is off alike against another channel."""
+    said = [f"{_channel_of(ones[0])} (gain {np.median([one.estimate for one in ones]):.4g})" for ones in groups]
+    if len(groups) > 1:
+        return f"{other}: {' and '.join(said)} disagree with it alike: correct its unit or factor {_AGAIN}"
+    (ones,) = groups
+    name = _channel_of(ones[0]) if len(ones) > 1 else ones[0].channel
+    gain = f"gain {np.median([one.estimate for one in ones]):.4g}"
+    return (
+        f"{name}: {ones[0].check}: {gain}: its unit or factor, or that of {other}, is wrong: correct that one {_AGAIN}"
+    )
+
+
+def _gain_off(one: ConsistencyFinding) -> str:
+    """What to correct where a single gain is turned or off by a factor; empty where it is neither."""
+    ratio, remedy = _factor(one), ""
+    if abs(ratio) < DEAD:
+        remedy = "it does not respond; mend the sensor"
+    elif ratio < 0.0:
+        remedy = f"turned; correct its sign {_AGAIN}"
+    elif max(ratio, 1.0 / ratio) > WRONG:
+        remedy = f"correct its unit or factor {_AGAIN}"
+    return remedy and f"{one.channel}: {one.check}: gain {one.estimate:.4g}: {remedy}"
 
 
 def check_campaign(machine: Machine, records: Sequence[xr.Dataset], sensors: str | None = None) -> CampaignCheck | None:

@@ -216,7 +216,7 @@ def _starts_in_motion(c: _Column) -> _Warning | None:
 
 def _saturated_spool(c: _Column) -> _Warning | None:
     full = np.abs(c.x) >= 0.999
-    if channel_unit(c.channel) != "1" or not full.any():
+    if channel_unit(c.channel) != "1" or not full.any() or _implausible_unit(c):
         return None
     what = f"is {'beyond' if np.abs(c.x).max() > 1.001 else 'at'} the end of its stroke in {full.sum()} samples"
     return c.channel, int(full.argmax()), what, "reduce the scale of the test"

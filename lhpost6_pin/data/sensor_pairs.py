@@ -24,7 +24,7 @@ from .sensor_view import BAND, RecordView, Regressor, SensorComparison
 from .sensors import SensorSet
 from .signals import Band, differentiate
 
-__all__ = ["LooseLength", "comparisons", "loose_lengths"]
+__all__ = ["LooseLength", "comparisons", "counterpart", "loose_lengths"]
 
 FAST = 0.3  # of the sampling rate: above it a command is fast
 
@@ -34,6 +34,18 @@ def comparisons(plant: Plant, record: xr.Dataset, sensors: SensorSet) -> Iterato
     view = RecordView(plant, record, sensors)
     for compare in (_forces, _lengths, _parity, _rates, _accelerometers, _struts, _supply, _spools, _redundant):
         yield from compare(view)
+
+
+def counterpart(check: str) -> str:
+    """Channel whose unit may as well be wrong where all gains of a check of `comparisons` are off; empty: none."""
+    other = check.rpartition(" against ")[2]
+    if other in LAYOUT:
+        return other
+    if check == "force against pressures":
+        return "chamber_pressure"
+    if "displacement" in check or "pose" in check or "gas law" in check:
+        return "platen_displacement"
+    return "spool_command" if check == "spool against command" else ""
 
 
 class LooseLength(NamedTuple):

@@ -217,9 +217,9 @@ def _accelerations(plant: Plant) -> list[Capacity]:
             k, how = "XY".index(name), f"strength of the reaction mass, {force / 1e6:.3g} MN, over effective mass"
             rows.append(Capacity(f"peak acceleration {name}, reaction mass", force / mass[k, k], None, "m/s2", how))
     if np.isfinite(strength.platen_up):
-        how = f"strength of the platen, {strength.platen_up / 1e6:.3g} MN, less weight over effective mass"
-        value = (strength.platen_up - weight) / mass[2, 2]
-        rows.append(Capacity("peak acceleration Z up, platen", value, None, "m/s2", how))
+        how, left = f"strength of the platen, {strength.platen_up / 1e6:.3g} MN, ", strength.platen_up - weight
+        how += "less weight over effective mass" if left > 0.0 else f"which the weight of {weight / 1e6:.3g} MN exceeds"
+        rows.append(Capacity("peak acceleration Z up, platen", max(left, 0.0) / mass[2, 2], None, "m/s2", how))
     if machine.motion == "free":
         rise, fall = axis_capacity(plant)
         for k in (3, 4, 5):

@@ -1,7 +1,7 @@
 """Demand of a target over the capacity of the table, and the largest scale within it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -131,7 +131,9 @@ def check_limits(
     peaks = limit_peaks(target, limits, _parts_of(target, check) if check else None, units)
     over = [peak for peak in peaks if peak.decides and peak.utilisation > _FULL]
     if over:
-        fits = largest_scale(target, limits, check)
+        fits, name = largest_scale(target, limits, check), target.reference.motion
+        if check is not None and fits == 0.0:
+            raise _beyond_at_rest(name, _over_at_rest(target, limits, check, units))
         name = target.reference.title if size is None else target.reference.motion
         largest = f"scale that fits is {fits:g}" if size is None else size(fits)
         raise OutOfRangeError(
@@ -149,14 +151,16 @@ def check_limits(
 def largest_scale(target: Target, limits: MotionLimits, check: MotionCheck | None = None) -> float:
     """Largest scale of the target's motion within all limits, rounded down to three digits.
 
-    Infinity for a target at rest (or below floating-point resolution). Actuator lengths and forces are not linear in
-    the motion: with `check` the scale is bracketed below that of the axes, guided by the share of each trial. They are
-    nearly so: only samples beside those are looked at whose demand was a good part of the largest in a first look at
-    some, and what is found is looked at in all.
+    Infinity for a target at rest (or below floating-point resolution), zero where what is mounted exceeds a limit at
+    rest. Actuator lengths and forces are not linear in the motion: with `check` the scale is bracketed below that of
+    the axes, guided by the share of each trial. They are nearly so: only samples beside those are looked at whose
+    demand was a good part of the largest in a first look at some, and what is found is looked at in all.
     """
     highest = max(peak.utilisation for peak in _axis_peaks(target, limits))
     if highest < np.finfo(float).tiny:
         return float("inf")
+    if check is not None and _over_at_rest(target, limits, check):
+        return 0.0
     found = high = 1 / highest
     governing = np.zeros(len(target.time), bool)
     if check is not None:
@@ -171,6 +175,25 @@ def largest_scale(target: Target, limits: MotionLimits, check: MotionCheck | Non
             break
         governing[others[_governing(shares)]] = True
     return _round_down(found * abs(target.reference.scale))
+
+
+def _over_at_rest(target: Target, limits: MotionLimits, check: MotionCheck, units: Units = SI) -> tuple[Peak, ...]:
+    """Limits that are exceeded before the target moves."""
+    first = slice(0, 1)
+    still = replace(target, time=target.time[first], **{key: 0.0 * getattr(target, key)[first] for key in _QUANTITIES})
+    peaks = limit_peaks(still, limits, _parts_of(still, check), units)
+    return tuple(peak for peak in peaks if peak.decides and peak.utilisation > _FULL)
+
+
+def _beyond_at_rest(motion: str, over: Sequence[Peak]) -> OutOfRangeError:
+    """Error of what is mounted exceeding limits at rest."""
+    found = "; ".join(f"{peak.name} {peak.quantity} {peak.text}" for peak in over)
+    return OutOfRangeError(
+        f"{motion} exceeds the capacity of the table at any scale, as what is mounted does at rest: {found}; lighten "
+        "the specimen",
+        0.0,
+        tuple(dict.fromkeys(peak.quantity for peak in over)),
+    )
 
 
 def _governing(shares: np.ndarray) -> np.ndarray:

@@ -72,6 +72,8 @@ def judged(plant: Plant, record: xr.Dataset) -> tuple[tuple[Peak, ...], str]:
         return (), ""
     if found.fits is None:
         return found.peaks, ""
+    if found.fits == 0.0:
+        return found.peaks, "No scale of this target is within all limits: what is mounted exceeds one at rest."
     return found.peaks, (
         f"The largest scale of this target within all limits, less their reserves, is {found.fits:g}; it was run at "
         f"{float(record.attrs['scale']):g}. What the achieved motion demands of each is in “Demand over capacity”."

@@ -244,7 +244,7 @@ def test_what_exceeds_a_limit_at_rest_fits_at_no_scale_and_says_so():
         looks.append(len(displacement))
         return [Demand("platen strength", ("z up",), 1.3 + np.abs(velocity[:, :1]), "of its strength")]
 
-    with pytest.raises(OutOfRangeError, match="at any scale, as what is mounted does at rest: z up platen .* 130 %"):
+    with pytest.raises(OutOfRangeError, match=r"at any scale, as what is mounted does at rest: z up platen .* 130 %"):
         check_limits(target, WIDE, check)
     assert largest_scale(target, WIDE, check) == 0.0
     assert sum(looks) < 1.1 * len(target.time)

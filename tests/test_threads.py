@@ -2,6 +2,7 @@
 
 import threading
 
+import numpy as np
 import pytest
 
 from lhpost6_pin.core.threads import by_threads
@@ -30,6 +31,16 @@ def test_the_error_of_a_part_is_raised():
 
     with pytest.raises(ValueError, match="part 3"):
         list(by_threads(failing, range(5)))
+
+
+def test_floating_point_errors_are_handled_as_the_caller_does():
+    def divide(part: int) -> float:
+        return float((np.ones(1) / np.zeros(1))[0])
+
+    with np.errstate(divide="ignore"):
+        assert list(by_threads(divide, range(3))) == [np.inf] * 3
+    with np.errstate(divide="raise"), pytest.raises(FloatingPointError):
+        list(by_threads(divide, range(3)))
 
 
 def test_one_processor_works_without_threads(monkeypatch):

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from typing import TypeVar
 
 __all__ = ["by_threads", "fill_by_threads", "row_blocks"]
@@ -18,13 +19,17 @@ _R = TypeVar("_R")
 
 
 def by_threads(function: Callable[[_P], _R], parts: Sequence[_P]) -> Iterator[_R]:
-    """What a function gives for each part, in their order; the first error that it raises ends the work."""
+    """What a function gives for each part, in their order; the first error that it raises ends the work.
+
+    It runs in the caller's context: numpy's handling of floating-point errors is as there.
+    """
     count = min(_MOST, len(parts), len(os.sched_getaffinity(0)))
     if count < 2:
         yield from map(function, parts)
         return
+    each = [(copy_context(), part) for part in parts]
     with ThreadPoolExecutor(count) as pool:
-        yield from pool.map(function, parts)
+        yield from pool.map(lambda one: one[0].run(function, one[1]), each)
 
 
 def row_blocks(rows: int) -> list[slice]:

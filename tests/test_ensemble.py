@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 from commands import refused
 from hypothesis import given
 from hypothesis import strategies as st
@@ -36,7 +37,7 @@ from lhpost6_pin.studies.loops import loops_of
 from lhpost6_pin.studies.plan_file import load_plan, plan_from
 from lhpost6_pin.studies.quantities import LIMITS
 from lhpost6_pin.studies.store import BlockStore, open_results
-from lhpost6_pin.studies.summary import Configuration, EnsembleSummary, LoopOf, Spread, summarise
+from lhpost6_pin.studies.summary import Configuration, EnsembleSummary, LoopOf, Spread, _spreads, summarise
 
 NUMBERS = load_parameters(models_folder() / "procedures" / "ensemble.toml")
 SINE = {"name": "sine", "options": {"amplitude": 0.05, "cycles": 1.0, "ramp_cycles": 0.5}}
@@ -503,6 +504,13 @@ def test_the_loop_of_every_specimen_is_in_the_results_and_an_unstable_one_in_the
     assert "With specimen block_4_9MN, controller tuned: The control loop is unstable" in ensemble_verdict(
         _summary(loops=(loop,))
     )
+
+
+@pytest.mark.parametrize(("values", "median"), [([9.0, 60.0], 34.5), ([3.0, 1.0, np.inf], 3.0), ([np.inf] * 4, np.inf)])
+def test_the_median_of_an_even_number_of_runs_is_between_the_middle_two(values, median):
+    labels = {"motion": ["sine"], "scale": [1.0], "specimen": ["none"], "controller": ["tuned"]}
+    (one,) = _spreads(xr.Dataset(coords=labels), "push", "1", np.reshape(values, (1, 1, 1, 1, -1)))
+    assert one.quantiles[1] == median and one.most == max(values)
 
 
 def test_a_file_that_holds_no_ensemble_is_named(tmp_path):

@@ -25,6 +25,7 @@ from lhpost6_pin.show.report.page import Page, Section, Table, bar, number, pack
 from lhpost6_pin.show.report.plots import ACHIEVED, Row, Trace, envelope, time_figure
 from lhpost6_pin.show.report.run_limits import limit_table
 from lhpost6_pin.show.report.run_report import RunSummary, lead_summary, write_run_report
+from lhpost6_pin.show.report.run_verdict import FOLLOWED, _against
 from lhpost6_pin.show.report.scales import SCALES, Scale, percent, scaled_number, shown_as
 from lhpost6_pin.show.report.specimen_section import response_blocks
 from lhpost6_pin.show.terminal import _rich
@@ -331,6 +332,12 @@ def test_a_target_was_not_followed_with_clipped_commands(tmp_path):
     record.attrs["spool_values_clipped"] = 21900
     summary, _ = report(tmp_path, record, limits=LIMITS)
     assert "The table tracked its target" not in summary.verdict and "does not follow its target" in summary.verdict
+
+
+def test_an_error_just_above_its_criterion_does_not_read_as_one_at_it():
+    allowed = FOLLOWED["displacement"]
+    assert _against(1.0001 * allowed, allowed) == f"just above {percent(allowed)}"
+    assert _against(allowed, allowed) == percent(allowed) and _against(1.1 * allowed, allowed) == percent(0.11)
 
 
 def test_the_verdict_on_a_run_that_stopped_begins_with_that_and_judges_nothing_else(tmp_path):

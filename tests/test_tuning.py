@@ -277,6 +277,19 @@ def test_noise_stays_within_the_limits_of_a_small_table():
     assert np.allclose(less.velocity[:, 1], ratio * usual.velocity[:, 1], rtol=1e-12, atol=0.0)
 
 
+def test_the_oil_column_that_limits_a_band_is_one_that_moves_its_axis(plant):
+    """That of pitch, at 35.3 Hz, is nearer to the end of the band than that of z, at 36.6 Hz, and moves x beside it."""
+    f = np.arange(1, 400) / 8.0
+
+    def words(axis):
+        transfer = Transfer(f, np.full((len(f), 1, 1), 0.5, complex), np.ones((len(f), 1)), (axis,))
+        return bandwidth_limitation(plant, transfer, (0.125, 32.0), 3.0, 0.8, 33.0).summary
+
+    assert "near the oil column at 36.6 Hz (z)" in words("z")
+    assert "near the oil column at 35.3 Hz (pitch)" in words("x")
+    assert "oil column" not in words("yaw")
+
+
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_of_two_axes_alike_the_own_oil_column_limits_the_band(axis):
     """Both columns of the biaxial table are at 21.35 Hz; those of x had been named for y."""

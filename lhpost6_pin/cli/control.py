@@ -151,7 +151,7 @@ def sine(
             metavar="<quantity>", help=r"Amplitude \[m, or rad], or with a unit: 50mm; default: half of what fits."
         ),
     ] = None,
-    frequency: Annotated[float, typer.Option(min=0.0, help="Frequency [Hz].")] = 0.5,
+    frequency: Annotated[float, quantity_option("--frequency", "Hz", "2Hz", r"Frequency \[Hz].")] = 0.5,
     axis: Annotated[
         str, typer.Option(help="Axis: x y z roll pitch or yaw.", autocompletion=completing(lambda: AXES))
     ] = "x",

@@ -143,7 +143,8 @@ def ensemble(
     made = _plan(plan, processing, {key: value for key, value in given.items() if value is not None})
     folder = opt.folder_for(out, made.name.replace("/", "_"), "report.html", own=RESULTS)
     count = len(made.blocks)
-    with progress_bar(f"{made.name}: {count} blocks of runs on {made.machine.name}") as progress:
+    blocks = f"{count} block of runs" if count == 1 else f"{count} blocks of runs"
+    with progress_bar(f"{made.name}: {blocks} on {made.machine.name}") as progress:
         path = run_ensemble(made, folder, jobs=jobs, dask=dask, progress=progress)
     with open_results(path) as results:
         found = summarise(results, made.numbers)

@@ -95,10 +95,16 @@ def _direction(c: _Channels) -> Observable | None:
     return Observable("friction by direction", "ratio", why)
 
 
+def _lacking(c: _Channels) -> str:
+    """What a valve's flow needs and is not there; empty if nothing is."""
+    valve, motion = "" if c.valve else "spool_position or valve_command", "" if c.motion else "displacement"
+    return " and ".join(filter(None, [valve, motion]))
+
+
 def _valve(c: _Channels) -> Observable:
     name = "valve gain and null"
-    if not (c.valve and c.motion):
-        return Observable(name, "no", "needs spool_position or valve_command, and displacement")
+    if missing := _lacking(c):
+        return Observable(name, "no", f"needs {missing}")
     if not c.difference:
         return Observable(name, "no", f"needs {_OIL}: without them the load shifts the flow as a null does")
     return Observable(name, "ratio", "flow against command; null in full command, gain over the piston area")
@@ -106,9 +112,9 @@ def _valve(c: _Channels) -> Observable:
 
 def _by_flow(quantity: str, c: _Channels, of: str) -> Observable:
     """A quantity of the balance of flow, over the piston area."""
-    if c.valve and c.motion and c.difference:
-        return Observable(quantity, "ratio", of)
-    return Observable(quantity, "no", f"needs displacement, spool_position or valve_command, and {_OIL}")
+    if missing := " and ".join(filter(None, [_lacking(c), "" if c.difference else _OIL])):
+        return Observable(quantity, "no", f"needs {missing}")
+    return Observable(quantity, "ratio", of)
 
 
 def _leakage(c: _Channels) -> Observable:

@@ -18,6 +18,7 @@ __all__ = ["SPOOL_STEP", "LinearPlant", "OilColumnMode", "linearize", "oil_colum
 
 # Finite-difference steps: small against every scale of the machine, large against rounding.
 _POSE_STEP, _VELOCITY_STEP, _PRESSURE_STEP, SPOOL_STEP = 1e-6, 1e-6, 1e2, 1e-6
+_MOVES = 0.1  # of the axis that moves most in a mode, from which on another moves, too
 _MODE_STEP = 1e-2  # of modal states, in which the plant is linear
 
 
@@ -32,11 +33,12 @@ class LinearPlant:
 
 @dataclass(frozen=True)
 class OilColumnMode:
-    """An oscillation: frequency [Hz], damping ratio [1], and the platen axis that moves most at C."""
+    """An oscillation: frequency [Hz], damping ratio [1], the platen axis that moves most at C, and all that move."""
 
     frequency: float
     damping: float
     axis: str
+    axes: tuple[str, ...]  # that move by a tenth of it or more, turns over half the platen's diagonal
 
 
 def linearize(plant: Plant, state: State, spool: Array) -> LinearPlant:
@@ -94,8 +96,8 @@ def oil_column_modes(machine: Machine, *, undamped: bool = True, loaded: bool = 
         twist = np.zeros(6, complex)
         twist[plant.axes] = vector[: linear.nv]
         at_c = np.concatenate([twist[:3] + np.cross(twist[3:], rho), twist[3:] * lengths / 2.0])
-        size = abs(value)
-        found.append(
-            OilColumnMode(float(size / (2 * np.pi)), float(-value.real / size), AXES[int(np.argmax(np.abs(at_c)))])
-        )
+        size, moved = abs(value), np.abs(at_c)
+        axes = tuple(axis for axis, x in zip(AXES, moved, strict=True) if x >= _MOVES * moved.max())
+        most = AXES[int(np.argmax(moved))]
+        found.append(OilColumnMode(float(size / (2 * np.pi)), float(-value.real / size), most, axes))
     return tuple(sorted(found, key=lambda m: m.frequency))

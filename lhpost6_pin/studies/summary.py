@@ -202,6 +202,7 @@ def _spreads(results: xr.Dataset, result: str, units: str, values: Array) -> Ite
         if own.size:
             with np.errstate(invalid="ignore"):  # of infinite demands
                 quantiles = np.quantile(own, QUANTILES, method="inverted_cdf")
+            quantiles[QUANTILES.index(0.5)] = np.median(own)
             where, ends = (motion, scale, specimen, controller), (float(own.min()), float(own.max()))
             yield Spread(*where, result, units, quantiles, *ends, len(own))
 

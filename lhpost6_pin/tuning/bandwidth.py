@@ -48,11 +48,12 @@ def bandwidth_limitation(
     specimen = _specimen_mode(plant, transfer.axes[0], float(f[at]))
     if specimen:
         words.append(specimen)
-    modes = oil_column_modes(plant.machine, loaded=True)
-    axis = transfer.axes[0]  # of columns as near as each other its own is named
-    near = min(modes, key=lambda mode: (round(_octaves(mode.frequency, f[at]), 2), mode.axis != axis))
-    if _octaves(near.frequency, f[at]) < OIL_COLUMN_OCTAVES:
-        words.append(f"near the oil column at {near.frequency:.3g} Hz ({near.axis})")
+    axis = transfer.axes[0]
+    modes = [mode for mode in oil_column_modes(plant.machine, loaded=True) if axis in mode.axes]
+    if modes:  # of columns as near as each other its own is named
+        near = min(modes, key=lambda mode: (round(_octaves(mode.frequency, f[at]), 2), mode.axis != axis))
+        if _octaves(near.frequency, f[at]) < OIL_COLUMN_OCTAVES:
+            words.append(f"near the oil column at {near.frequency:.3g} Hz ({near.axis})")
     if not specimen:
         words.append(f"with {360.0 * f[at] * float(plant.delays.max()):.0f} deg of valve delay")
     return BandwidthLimitation(", ".join(words), bool(specimen))

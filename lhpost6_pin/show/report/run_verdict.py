@@ -82,10 +82,16 @@ def _followed(record: xr.Dataset, found: Sequence[Tracking], *, clipped: bool) -
     if good and clipped:
         start = "Errors are within the criteria, but with clipped commands the table does not follow its target"
     words = " and ".join(
-        f"{row.quantity} {percent(row.rrmse_aligned)} ({row.axis}, criterion {100 * allowed:.0f} %)"
+        f"{row.quantity} {_against(row.rrmse_aligned, allowed)} ({row.axis}, criterion {100 * allowed:.0f} %)"
         for row, allowed in tracked
     )
     return f"{start}: worst RRMSE, delay removed, {words}.", "good" if good and not clipped else "attention"
+
+
+def _against(error: float, allowed: float) -> str:
+    """An error in per cent, with a word where only digits that are not shown are beyond what is allowed."""
+    same = error > allowed and percent(error) == percent(allowed)
+    return "just above " * same + percent(error)
 
 
 def _clipped(record: xr.Dataset, spools: Sequence[SpoolUse]) -> str:

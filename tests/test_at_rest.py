@@ -9,7 +9,7 @@ import xarray as xr
 
 from lhpost6_pin.core.names import AXES
 from lhpost6_pin.data.at_rest import at_rest
-from lhpost6_pin.data.metrics import commanded_axes, track
+from lhpost6_pin.data.metrics import commanded_axes, peaks, track
 from lhpost6_pin.data.replay_comparison import compare
 from lhpost6_pin.data.signals import Band
 from lhpost6_pin.identification.decompose.agreement import _match
@@ -85,3 +85,16 @@ def test_forces_of_an_axis_at_rest_are_stated_as_a_difference_in_newtons():
     assert row[:2] == ("y", "at rest") and "differs by 0" in row[2] and "%" not in "".join(row)
     larger = _match(found, measured, motion(1e5 * SINE, 2e3 * SINE), 0.5)
     assert "1.41\N{NO-BREAK SPACE}kN rms" in cast(str, _match_row(larger, 1)[2])
+
+
+@pytest.mark.parametrize("shape", [(1, 6), (63, 2), (64, 6), (1000, 3), (200,), (130, 2, 4)])
+@pytest.mark.parametrize("gaps", [False, True])
+def test_peaks_are_those_of_all_rows(shape, gaps):
+    """Rows are reduced side by side, by 64: the largest of each column is found wherever it is."""
+    rng = np.random.default_rng(len(shape))
+    for _ in range(20):
+        values = rng.standard_normal(shape)
+        if gaps:
+            values[rng.random(shape) < 0.1] = np.nan
+        finite = np.where(np.isnan(values), -1.0, np.abs(values)).max(axis=0)
+        np.testing.assert_array_equal(peaks(values), np.where(finite < 0.0, np.nan, finite))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -320,8 +321,8 @@ def _deciding(motion: Motion, check: MotionCheck, factor: float, some: np.ndarra
     demands, count = _parts_of(motion, check, factor, some), len(motion.displacement[some])
 
     def largest(block: slice) -> np.ndarray:
-        shares = [np.abs(demand.share).max(axis=1) for demand in demands(block) if demand.decides]
-        return _magnitudes(np.max(shares, axis=0)) if shares else np.zeros(block.stop - block.start)
+        shares = [column for demand in demands(block) if demand.decides for column in np.abs(demand.share).T]
+        return _magnitudes(reduce(np.maximum, shares)) if shares else np.zeros(block.stop - block.start)
 
     return np.concatenate([np.zeros(0), *by_threads(largest, row_blocks(count))])
 

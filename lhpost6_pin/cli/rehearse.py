@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from ..core.arrays import Array
     from ..machine.machine import Machine
     from ..motions import Target
-    from ..show.report.run_report import RunSummary
     from ..simulation.loops import ClosedLoop, PluggedLoop
     from ..simulation.rehearse import SimulatedTest
     from ..tuning.interaction import Interaction
@@ -280,7 +279,6 @@ def save_run(
 
     Raises typer.Exit if the run stopped on the way.
     """
-    from ..core.threads import by_threads
     from ..data.records import save_record, thinned
     from ..data.replay_comparison import compare
     from ..show.report.open_loop_report import write_open_loop_report
@@ -289,33 +287,27 @@ def save_run(
     from ..show.tables import machine_rows, print_comparison, print_run
 
     done, record = test
-    files = [*more, *(folder / file for file in RUN_FILES if file not in leave_out)]
+    files, summary = [*more, *(folder / file for file in RUN_FILES if file not in leave_out)], None
     path = None if RUN_FILES[1] in leave_out else files[-1]
+    if RUN_FILES[0] not in leave_out:
+        save_record(thinned(record, record_every), folder / RUN_FILES[0], single=True)
     remarks = run_remarks(test)
     for remark in remarks:
         log.warning("%s", remark)
     notes, command = [*notes, *notes_of_run(done, remarks)], repeating_command()
-    compared = [] if against is None else compare(against, record)
-
-    def save() -> tuple[None, dict[str, Any]]:
-        if RUN_FILES[0] not in leave_out:
-            save_record(thinned(record, record_every), folder / RUN_FILES[0], single=True)
-        return None, {}
-
-    def report() -> "tuple[RunSummary | None, dict[str, Any]]":
-        if against is None:
-            summary = write_test_report(done.plant, record, path, notes, command=command, interaction=interaction)
-            return summary, loop_entries(record.attrs)
-        rows = machine_rows(done.plant.machine)
+    entries: dict[str, Any]
+    if against is None:
+        summary = write_test_report(done.plant, record, path, notes, command=command, interaction=interaction)
+        entries = loop_entries(record.attrs)
+    else:
+        compared, rows = compare(against, record), machine_rows(done.plant.machine)
         verdict, level = write_open_loop_report(
             against, record, compared, files[-1], notes=notes, command=command, machine_table=rows
         )
-        return None, {"verdict": verdict, "level": level, "against_record": compared}
-
-    _, (summary, entries) = by_threads(lambda work: work(), (save, report))
+        entries = {"verdict": verdict, "level": level, "against_record": compared}
 
     def show() -> None:
-        if compared:
+        if against is not None and compared:
             print_comparison(compared)
         print_run(done, summary)
 

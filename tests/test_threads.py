@@ -43,6 +43,14 @@ def test_floating_point_errors_are_handled_as_the_caller_does():
         list(by_threads(divide, range(3)))
 
 
-def test_one_processor_works_without_threads(monkeypatch):
-    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0})
+@pytest.mark.parametrize(("processors", "stated"), [({0}, "4"), ({0, 1}, "1")])
+def test_one_processor_and_workers_of_joblib_work_without_threads(monkeypatch, processors, stated):
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: processors)
+    monkeypatch.setenv("OMP_NUM_THREADS", stated)
     assert list(by_threads(lambda _: threading.current_thread().name, range(2))) == ["MainThread"] * 2
+
+
+def test_two_processors_work_with_threads(monkeypatch):
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 1})
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    assert "MainThread" not in by_threads(lambda _: threading.current_thread().name, range(2))

@@ -23,13 +23,18 @@ def by_threads(function: Callable[[_P], _R], parts: Sequence[_P]) -> Iterator[_R
 
     It runs in the caller's context: numpy's handling of floating-point errors is as there.
     """
-    count = min(_MOST, len(parts), len(os.sched_getaffinity(0)))
-    if count < 2:
+    if (count := min(_threads(), len(parts))) < 2:
         yield from map(function, parts)
         return
     each = [(copy_context(), part) for part in parts]
     with ThreadPoolExecutor(count) as pool:
         yield from pool.map(lambda one: one[0].run(function, one[1]), each)
+
+
+def _threads() -> int:
+    """Threads of this process: one a processor, or as OMP_NUM_THREADS states, which joblib and Dask set for workers."""
+    stated = os.environ.get("OMP_NUM_THREADS", "")
+    return min(_MOST, len(os.sched_getaffinity(0)), int(stated) if stated.isdecimal() else _MOST)
 
 
 def row_blocks(rows: int) -> list[slice]:

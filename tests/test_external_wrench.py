@@ -5,6 +5,7 @@ import pytest
 from machine_cases import MACHINES, machine_named
 from run_cases import at_rest
 
+from lhpost6_pin.core.compiled import compiled
 from lhpost6_pin.mechanics.derivatives import evaluate_derivatives
 from lhpost6_pin.mechanics.forward_dynamics import platen_acceleration
 from lhpost6_pin.mechanics.rigid_body import platen_inertia
@@ -34,4 +35,11 @@ def test_the_external_wrench_lies_in_the_buffer_of_the_workspace():
     plant, rest = at_rest(machine_named("lhpost6"))
     ws = make_workspace(plant, rest.state)
     ws.external[:] = WRENCH
-    assert np.array_equal(unpack_workspace.py_func(ws.buffer).external, WRENCH)
+    found = np.zeros(6)
+    _external(ws.buffer, found)
+    assert np.array_equal(found, WRENCH)
+
+
+@compiled
+def _external(buffer, out):  # type: ignore[no-untyped-def]
+    out[:] = unpack_workspace(buffer).external

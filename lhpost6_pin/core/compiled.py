@@ -112,7 +112,7 @@ def compiled_inline(function: _F) -> _F:
 
 
 def compiled_views(function: _F) -> _F:
-    """As `compiled`, inlined in every compiled caller: for one that returns views of its `borrowed` arguments."""
+    """As `compiled`, inlined in every caller, compiled as well: for one that returns views of `borrowed` arguments."""
     return _jit(function, forceinline=True)
 
 

@@ -132,9 +132,9 @@ def check_limits(
     peaks = limit_peaks(target, limits, _parts_of(target, check) if check else None, units)
     over = [peak for peak in peaks if peak.decides and peak.utilisation > _FULL]
     if over:
-        fits, name = largest_scale(target, limits, check), target.reference.motion
+        fits = largest_scale(target, limits, check)
         if check is not None and fits == 0.0:
-            raise _beyond_at_rest(name, _over_at_rest(target, limits, check, units))
+            raise _beyond_at_rest(target.reference.motion, _over_at_rest(target, limits, check, units))
         name = target.reference.title if size is None else target.reference.motion
         largest = f"scale that fits is {fits:g}" if size is None else size(fits)
         raise OutOfRangeError(

@@ -63,7 +63,8 @@ class CampaignCheck:
                 alike.setdefault(other, []).append(ones)
             else:
                 alone += [words for one in ones if one.verdict == "suspicious" and (words := _gain_off(one))]
-        return *(_unit_off(other, groups) for other, groups in alike.items()), *alone
+        units = [words for other, groups in alike.items() for words in _units_off(other, groups)]
+        return *units, *alone
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -96,17 +97,18 @@ def _off_alike(gains: Sequence[ConsistencyFinding]) -> bool:
     return least > DEAD and most < WRONG * least and (most < 1.0 / WRONG or least > WRONG)
 
 
-def _unit_off(other: str, groups: Sequence[Sequence[ConsistencyFinding]]) -> str:
-    """What to correct where each of these groups of gains is off alike against another channel."""
-    said = [f"{_channel_of(ones[0])} (gain {np.median([one.estimate for one in ones]):.4g})" for ones in groups]
-    if len(groups) > 1:
-        return f"{other}: {' and '.join(said)} disagree with it alike: correct its unit or factor {_AGAIN}"
-    (ones,) = groups
-    name = _channel_of(ones[0]) if len(ones) > 1 else ones[0].channel
-    gain = f"gain {np.median([one.estimate for one in ones]):.4g}"
-    return (
-        f"{name}: {ones[0].check}: {gain}: its unit or factor, or that of {other}, is wrong: correct that one {_AGAIN}"
-    )
+def _units_off(other: str, groups: Sequence[Sequence[ConsistencyFinding]]) -> list[str]:
+    """What to correct where each of these groups of gains is off by a factor against another channel.
+
+    If it is the same for several groups, it is that channel's; else it may be either's.
+    """
+    gains = [f"gain {np.median([one.estimate for one in ones]):.4g}" for ones in groups]
+    if len(groups) > 1 and _off_alike([one for ones in groups for one in ones]):
+        said = [f"{_channel_of(ones[0])} ({gain})" for ones, gain in zip(groups, gains, strict=True)]
+        return [f"{other}: {' and '.join(said)} disagree with it alike: correct its unit or factor {_AGAIN}"]
+    wrong = f"its unit or factor, or that of {other}, is wrong: correct that one {_AGAIN}"
+    names = [_channel_of(ones[0]) if len(ones) > 1 else ones[0].channel for ones in groups]
+    return [f"{name}: {ones[0].check}: {g}: {wrong}" for name, ones, g in zip(names, groups, gains, strict=True)]
 
 
 def _gain_off(one: ConsistencyFinding) -> str:

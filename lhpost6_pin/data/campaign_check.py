@@ -102,8 +102,9 @@ def _units_off(other: str, groups: Sequence[Sequence[ConsistencyFinding]]) -> li
 
     If it is the same for several groups, it is that channel's; else it may be either's.
     """
+    middle = [float(np.median([_factor(one) for one in ones])) for ones in groups]
     gains = [f"gain {np.median([one.estimate for one in ones]):.4g}" for ones in groups]
-    if len(groups) > 1 and _off_alike([one for ones in groups for one in ones]):
+    if len(groups) > 1 and max(middle) < WRONG * min(middle):
         said = [f"{_channel_of(ones[0])} ({gain})" for ones, gain in zip(groups, gains, strict=True)]
         return [f"{other}: {' and '.join(said)} disagree with it alike: correct its unit or factor {_AGAIN}"]
     wrong = f"its unit or factor, or that of {other}, is wrong: correct that one {_AGAIN}"

@@ -100,12 +100,14 @@ def _off_alike(gains: Sequence[ConsistencyFinding]) -> bool:
 def _units_off(other: str, groups: Sequence[Sequence[ConsistencyFinding]]) -> list[str]:
     """What to correct where each of these groups of gains is off by a factor against another channel.
 
-    If it is the same for several groups, it is that channel's; else it may be either's.
+    If it is about the same for several groups, it is that channel's, whatever the others show (strut pressures are not
+    proportional to it); else it may be either's.
     """
-    middle = [float(np.median([_factor(one) for one in ones])) for ones in groups]
+    middle = np.array([np.median([_factor(one) for one in ones]) for ones in groups])
     gains = [f"gain {np.median([one.estimate for one in ones]):.4g}" for ones in groups]
-    if len(groups) > 1 and max(middle) < WRONG * min(middle):
-        said = [f"{_channel_of(ones[0])} ({gain})" for ones, gain in zip(groups, gains, strict=True)]
+    usual = np.abs(np.log(middle / np.median(middle))) < np.log(WRONG)
+    if usual.sum() > 1:
+        said = [f"{_channel_of(groups[k][0])} ({gains[k]})" for k in np.flatnonzero(usual)]
         return [f"{other}: {' and '.join(said)} disagree with it alike: correct its unit or factor {_AGAIN}"]
     wrong = f"its unit or factor, or that of {other}, is wrong: correct that one {_AGAIN}"
     names = [_channel_of(ones[0]) if len(ones) > 1 else ones[0].channel for ones in groups]

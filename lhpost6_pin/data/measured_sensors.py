@@ -171,8 +171,9 @@ def measured_sensors(
         found[f"noise.{name}"] = _measured(sd, _unit(name), f"{levels.source}, {one.low:.3g} to {one.high:.3g} Hz")
     sensors = [name for name in levels.channels if LAYOUT[name].role != "command"]
     skews = group_delays(plant, records)
+    commanded = all("spool_command" in record for record in records)  # the scale of a spool is then that of its command
     for name in sensors:
-        if (LAYOUT[name].group or name) in skews:
+        if (LAYOUT[name].group or name) in skews or (commanded and name == "spool_position"):
             found[f"gain_range.{name}"] = numbers["assumed.gain"]
     for name in sensors:
         offset = _offset(plant.machine, levels.channels[name], levels.source, numbers)

@@ -107,7 +107,7 @@ def _units_off(other: str, groups: Sequence[Sequence[ConsistencyFinding]]) -> li
     gains = [f"gain {np.median([one.estimate for one in ones]):.4g}" for ones in groups]
     usual = np.abs(np.log(middle / np.median(middle))) < np.log(WRONG)
     if usual.sum() > 1:
-        said = [f"{_channel_of(groups[k][0])} ({gains[k]})" for k in np.flatnonzero(usual)]
+        said = [f"{_channel_of(groups[k][0])} ({gains[k]})" for k in np.flatnonzero(usual).tolist()]
         return [f"{other}: {' and '.join(said)} disagree with it alike: correct its unit or factor {_AGAIN}"]
     wrong = f"its unit or factor, or that of {other}, is wrong: correct that one {_AGAIN}"
     names = [_channel_of(ones[0]) if len(ones) > 1 else ones[0].channel for ones in groups]

@@ -14,6 +14,7 @@ from lhpost6_pin.data.campaign import Campaign, load_campaign
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.identification.calibration import Calibration, Subset, calibration_numbers, machine_parameters
 from lhpost6_pin.identification.calibration.calibration_summary import (
+    command_note,
     contradiction_summary,
     correlation_summary,
     cut_strokes,
@@ -84,6 +85,22 @@ def found() -> Calibration:
 def page_of(calibration: Calibration, folder: Path) -> str:
     path = write_calibrate_report(calibration, folder / "page.html", command="lhpost6 calibrate march")
     return Reader(path).words.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_a_valve_delay_that_no_balance_contains_points_to_the_search(found, tmp_path, capsys):
+    """It had been "not informed: the tests hardly narrow it", where commands and spools fix it to 0.1 ms."""
+    assert command_note(found) == ""  # it is no unknown
+    covariance = found.covariance.copy()
+    covariance[0, 0] = found.prior[0] ** 2
+    delay = replace(found.parameters[0], name="horizontal.valve_delay")
+    told = replace(found, parameters=(delay, *found.parameters[1:]), covariance=covariance)
+    told = replace(told, estimate=np.r_[0.0, found.estimate[1:]])
+    assert command_note(told).startswith(
+        "horizontal.valve_delay: commands are in no balance of a calibration; `lhpost6"
+    )
+    print_calibration(told)
+    assert "commands are in no balance" in " ".join(capsys.readouterr().out.split())
+    assert "commands are in no balance" in page_of(told, tmp_path)
 
 
 def test_a_delay_beyond_its_stated_range_that_was_removed_first_is_not_passed_over(found, tmp_path, capsys):

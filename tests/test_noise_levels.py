@@ -249,6 +249,20 @@ def test_round_off_of_a_computed_column_is_no_noise(tests):
     assert density[0] > 0 and density[5] == 0.0
 
 
+@pytest.mark.parametrize("commanded", [False, True])
+def test_the_gain_of_a_spool_may_be_off_where_its_command_tells(tests, commanded):
+    """A gain of 1.0015, as sensors have, had been an unexplained residual: without a command it is the valve's flow."""
+    records = []
+    for k, record in enumerate(tests):
+        t = record["time"].values
+        command = np.where(t > BEFORE, 0.1 * np.sin(8 * t), 0.0)[:, None]
+        noise = 1e-4 * np.random.default_rng(k).standard_normal(command.shape)
+        spools = {"spool_position": command + noise} | ({"spool_command": command} if commanded else {})
+        made = make_record(t, spools, TABLE.labels, {})
+        records.append(record.assign({name: made[name] for name in spools}))
+    assert ("gain_range.spool_position" in measured_sensors(PLANT, records)) == commanded
+
+
 def test_noise_that_a_file_states_wrongly_is_replaced_by_that_of_the_records_and_no_other(tests, tmp_path, caplog):
     content = measured_sensors(PLANT, tests)
     stated = content.quantities["noise.pressure_difference"]

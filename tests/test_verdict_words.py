@@ -17,7 +17,7 @@ from lhpost6_pin.discovery.effect_loops import squares_explained
 from lhpost6_pin.discovery.finding import EffectFinding
 from lhpost6_pin.discovery.held_out import Gap, GapTraces
 from lhpost6_pin.discovery.verdict import Verdict
-from lhpost6_pin.discovery.verdict_file import summary
+from lhpost6_pin.discovery.verdict_file import summary, worse_note
 from lhpost6_pin.discovery.verdict_notes import (
     balance_note,
     before_screening,
@@ -79,6 +79,16 @@ def traces(phase: str) -> GapTraces:
     measured = np.zeros(100)
     models = np.stack([3.0 * time, 3.0 * time, measured], axis=1)
     return GapTraces(phase, "EQ", "chamber_pressure_a", "H4", time, measured, models, 0.1)
+
+
+def test_a_refit_that_raises_the_error_of_a_phase_says_so_and_is_no_good_news():
+    """A valve delay fitted as half had raised the closed loop's error from 1.03 to 4.47 under a green verdict."""
+    gap = Gap("closed loop", "TZ", 1.03, 4.47, 4.47, 1.15)
+    found = identified(gap, word="none")
+    found.verdict = replace(found.verdict, effects=())
+    assert "(closed loop of TZ 1.03 to 4.47 times sensor noise): do not take parameters" in worse_note(found)
+    assert _verdict_of(found)[1] == "attention"
+    assert worse_note(identified(replace(gap, refitted=1.5))) == ""  # friction's path may do that
 
 
 def test_the_error_of_a_simulation_that_starts_from_the_record_begins_at_zero():

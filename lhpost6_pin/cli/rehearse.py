@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..core.errors import ParameterError, RecordError, SimulationError
+from ..core.files import shipped
 from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
-from .completion import complete_motion
+from .completion import complete_motion, completing
 from .live_view import EndedBySignal, LiveOptions, watched
 from .loop_check import TUNING_FILES, checked_loop, interaction_of, loop_entries, loop_facts, retuned
 from .motion_options import MotionOptions
@@ -201,7 +202,14 @@ def campaign(
         Path | None, typer.Option(help="Directory of the records, without any so far; default: out/campaign.")
     ] = None,
     controller: opt.SettingsName = None,
-    sensors: opt.SensorsName = None,
+    sensors: Annotated[
+        str | None,
+        typer.Option(
+            help="Noise and errors of the sensors: shipped name, or a TOML file; default: those that the machine file "
+            "names, else the LHPOST6's.",
+            autocompletion=completing(lambda: shipped("sensors")),
+        ),
+    ] = None,
     tests: Annotated[str | None, typer.Option(help="Tests of the campaign, such as TX,WN; default: all.")] = None,
     scale: Annotated[
         float, quantity_option("--scale", "1", "50%", "Scale factor of all motions, e.g. for a smaller table.")

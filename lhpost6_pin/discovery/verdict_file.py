@@ -24,7 +24,7 @@ from .verdict import SensorFinding
 from .verdict_notes import before_screening, interval_note, open_summary, refit_summary
 from .withdrawal import Why
 
-__all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "where"]
+__all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "where", "worse_note"]
 
 
 _WITHDRAWN: dict[Why, str] = {
@@ -42,8 +42,9 @@ CONSIDERED = 1.0
 REMAINS = 0.01
 """Share of the squares beyond the expected scatter from which what remains is stated."""
 
-WORSE = 1.05
-"""Normalised RMS error on a held-out test over that before, from which it counts as worse."""
+WORSE, RAISED = 1.05, 1.5
+"""Normalised RMS error on a held-out test over that before, from which it counts as worse: of balances, and of phases,
+whose errors friction's path changes by chance."""
 
 
 def save_verdict(found: Discovery, path: Path) -> Path:
@@ -225,7 +226,7 @@ def summary(found: Discovery) -> str:
     for one in found.beyond:
         far = f"{one.test} moves {one.component} by {one.reached:.3g} m, the tests searched by {one.searched:.3g} m"
         text += f" {far}: beyond that, {title_of(one.family)} is extrapolated."
-    if (worse := _worse(found)) is not None:
+    if worse := worse_note(found):
         text += f" {worse}"
     if (scatter := _scatter(found)) is not None:
         text += f" {scatter}"
@@ -265,13 +266,22 @@ def _beyond(sensors: Sequence[SensorFinding]) -> str:
     return f"sensors beyond the ranges of the sensors file: {', '.join(each)}"
 
 
-def _worse(found: Discovery) -> str | None:
-    """That a refit is worse than the machine as delivered on held-out tests; None where it is not."""
-    worse = [one for one in found.balances if one.error[1] > WORSE * max(one.error[0], NOISE)]
+def worse_note(found: Discovery) -> str:
+    """That a refit is worse than the machine as delivered on held-out tests; empty where it is not."""
+    worse = [
+        f"{one.kind} of {one.test} {one.error[0]:.2f} to {one.error[1]:.2f}"
+        for one in found.balances
+        if one.error[1] > WORSE * max(one.error[0], NOISE)
+    ]
+    worse += [
+        f"{one.phase} of {one.test} {one.delivered:.2f} to {one.refitted:.2f} times sensor noise"
+        for one in (found.proof.gaps if found.proof else ())
+        if one.refitted > RAISED * max(one.delivered, one.floor, NOISE)
+    ]
     if not worse:
-        return None
-    each = ", ".join(f"{one.kind} of {one.test} {one.error[0]:.2f} to {one.error[1]:.2f}" for one in worse)
-    return f"The refit without effects is worse than the machine as delivered on held-out tests ({each})."
+        return ""
+    start = "The refit without effects is worse than the machine as delivered on held-out tests"
+    return f"{start} ({', '.join(worse)}): do not take parameters that differ before that is explained."
 
 
 def _scatter(found: Discovery) -> str | None:

@@ -7,6 +7,7 @@ from ..data.campaign import skipped_summary
 from ..discovery import Discovery
 from ..identification.calibration import Calibration
 from ..identification.calibration.calibration_summary import (
+    command_note,
     contradiction_summary,
     convergence_summary,
     correlation_summary,
@@ -79,6 +80,7 @@ def print_calibration(calibration: Calibration) -> None:
     print_blocks(
         parameter_table(calibration),
         interval_summary(calibration),
+        command_note(calibration),
         off,
         f"{len(off.rows)} of {len(calibration.unknowns)} sensor errors are significant, {range_summary(calibration)}",
         delay_summary(calibration),

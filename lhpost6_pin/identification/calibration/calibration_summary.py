@@ -3,10 +3,10 @@
 import numpy as np
 
 from .free_parameters import parameter_changes
-from .result import Calibration, contradictions, out_of_range, stated_range
+from .result import Calibration, contradictions, out_of_range, stated_range, verdict_on
 
-__all__ = ["chance", "compared", "contradiction_summary", "convergence_summary", "correlation_summary", "cut_strokes"]
-__all__ += ["delay_summary", "friction_summary", "interval_summary", "lacking", "range_summary"]
+__all__ = ["chance", "command_note", "compared", "contradiction_summary", "convergence_summary", "correlation_summary"]
+__all__ += ["cut_strokes", "delay_summary", "friction_summary", "interval_summary", "lacking", "range_summary"]
 
 
 def cut_strokes(calibration: Calibration) -> list[str]:
@@ -57,6 +57,20 @@ def interval_summary(calibration: Calibration) -> str:
         f"Intervals allow for sensor noise, not for errors of the model: misfit is left (mean square {largest:.3g} at "
         "most, 1 is sensor noise), so that they are too narrow."
     )
+
+
+def command_note(calibration: Calibration) -> str:
+    """That no balance of a calibration has the way from commands to spools; empty where its delay is no unknown."""
+    count = len(calibration.parameters)
+    delays = [
+        name
+        for i, name in enumerate(calibration.names[:count])
+        if name.endswith(".valve_delay") and verdict_on(calibration, i) == "not informed"
+    ]
+    if not delays:
+        return ""
+    remedy = "`lhpost6 discover` fits it where commands and spools were recorded"
+    return f"{', '.join(delays)}: commands are in no balance of a calibration; {remedy}."
 
 
 def convergence_summary(calibration: Calibration) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...identification.calibration import Calibration
 from ...identification.calibration.calibration_summary import (
+    command_note,
     contradiction_summary,
     correlation_summary,
     cut_strokes,
@@ -82,8 +83,8 @@ def parameter_blocks(calibration: Calibration) -> list[Block]:
         "components of its kind, which move together."
     )
     tables = (parameter_table(calibration), *ratio_tables(calibration))
-    narrow = filter(None, [interval_summary(calibration)])
-    return [forest_figure(calibration), how, *narrow, *tables, *cut_strokes(calibration)]
+    notes = filter(None, [interval_summary(calibration), command_note(calibration)])
+    return [forest_figure(calibration), how, *notes, *tables, *cut_strokes(calibration)]
 
 
 def ratio_tables(calibration: Calibration) -> list[Table]:

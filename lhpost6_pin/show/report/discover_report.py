@@ -11,7 +11,7 @@ from ...discovery.estimates import Estimate
 from ...discovery.finding import EffectFinding
 from ...discovery.held_out import Proof
 from ...discovery.verdict import SensorFinding, Verdict, Word
-from ...discovery.verdict_file import advice, summary, title_of, where
+from ...discovery.verdict_file import advice, summary, title_of, where, worse_note
 from ...discovery.verdict_notes import (
     EXPECTED_SCATTER,
     balance_note,
@@ -96,7 +96,7 @@ def _verdict_of(found: Discovery) -> tuple[str, Level]:
     words, level = _VERDICTS[found.verdict.word]
     if found.verdict.word in ("named", "ambiguous") and (left := open_share(found)) > PARTLY:
         return f"{words}, {100.0 * left:.0f} % of the held-out error remains", "attention"
-    return words, level
+    return words, "attention" if level == "good" and worse_note(found) else level
 
 
 def verdict_sentence(found: Discovery) -> str:

@@ -56,6 +56,25 @@ class EvaluationGroup(NamedTuple):
     residuals: tuple[str, ...]  # kinds that depend on it
 
 
+def _steps(every: Sequence[FreeParameter | SensorUnknown], share: float) -> Array:
+    """Steps of the coordinates (p,) for derivatives: a share of each one's deviation, of delays the same time.
+
+    A one-sided difference of a shift in time is the derivative half a step later. Where residuals show only a sum of
+    delays, unequal steps would seem to tell its parts apart: a valve's delay is added, a sensor's removed.
+    """
+    steps = np.array([one.step or share * one.sd for one in every])
+    late: dict[int, float] = {}
+    for i, one in enumerate(every):
+        if isinstance(one, FreeParameter):
+            late |= {i: one.slope(0.0)} if one.name.endswith(".valve_delay") else {}
+        elif one.kind == "delay":
+            late[i] = -1.0
+    shift = min((abs(steps[i] * slope) for i, slope in late.items()), default=0.0)
+    for i, slope in late.items():
+        steps[i] = shift / slope
+    return steps
+
+
 class Problem:
     """Tests and their noisier copies, unknowns with their priors, and the whitener of the sensors' noise."""
 
@@ -126,7 +145,7 @@ class Problem:
         self.names = tuple(one.name for one in every)
         self.stated = np.array([one.sd for one in every])
         self.prior = self.stated * [self.free.get(name, 1.0) for name in self.names]
-        self.step = np.array([one.step or self.comparison.step * one.sd for one in every])
+        self.step = _steps(every, self.comparison.step)
         # (p,) in which residuals are not nearly linear: all but shifts of points in plan, gains and offsets
         self.bent = np.array([*(not k.mirrored for k in parameters), *(u.kind == "delay" for u in self.unknowns)])
         self.lowest, self.highest = np.array([(one.lowest, one.highest) for one in every]).reshape(-1, 2).T

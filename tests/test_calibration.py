@@ -349,8 +349,8 @@ def test_unknowns_evaluated_together_have_the_derivatives_of_each_alone(problem)
 def test_where_a_sum_of_delays_is_known_derivatives_do_not_tell_its_parts_apart(machine, sensors, seen):
     """Valves later and commands taken out as late as that leave the servo residual as it is.
 
-    One-sided differences with steps of different lengths had left a thousandth of each derivative: a valve's delay of
-    4 ms was "identified" as 1.8 +- 0.3 ms, with the commands late by the rest.
+    One-sided differences with unequal steps had left a part of each derivative: a valve's delay of 4 ms was
+    "identified" as 1.8 +- 0.3 ms, with the commands late by the rest.
     """
     keys = "horizontal.valve_delay", "vertical.valve_delay"
     unsure = {key: replace(q := machine.parameters[key], sd=0.5 * float(q.value)) for key in keys}
@@ -369,8 +369,8 @@ def test_where_a_sum_of_delays_is_known_derivatives_do_not_tell_its_parts_apart(
     *of_valves, of_commands = dense
     whole = sum(out / p.slope(0.0) for out, p in zip(of_valves, valves, strict=True))
     assert np.abs(whole).max() > 0.0
-    # rounding of residuals, 1e-16 of them, over a step of some microseconds
-    np.testing.assert_allclose(whole + of_commands, 0.0, atol=1e-8 * np.abs(whole).max())
+    # shifts extend both ends of the record differently: 1.4e-6 is left; 2e-2 with unequal steps
+    np.testing.assert_allclose(whole + of_commands, 0.0, atol=1e-5 * np.abs(whole).max())
 
 
 def test_pressures_that_stand_in_for_forces_show_in_the_wrench(seen, machine, sensors):

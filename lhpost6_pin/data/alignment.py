@@ -84,9 +84,7 @@ def phase_delay(reference: ArrayLike, signal: ArrayLike, dt: float, band: Band =
     m = len(ref) / length
     coherence = np.divide(np.abs(cross) ** 2, power, out=np.zeros_like(power), where=power > 0)
     by_chance = _by_chance(np.minimum(coherence, MOST), (len(ref) - length // 2) // (length - length // 2))
-    if m > 1:
-        coherence = np.clip((m * coherence - 1) / (m - 1), 0.0, 1.0)  # without the estimate's bias
-    coherence = np.minimum(coherence, MOST)
+    coherence = np.clip((m * coherence - 1) / (m - 1), 0.0, MOST)  # without the estimate's bias
     weight = np.where(by_chance, 0.0, 2 * m * coherence / (1 - coherence))
     information = np.sum(weight * omega**2, axis=0)
     error = np.divide(1.0, np.sqrt(information), out=np.full(len(information), np.inf), where=information > 0)

@@ -55,10 +55,9 @@ class CampaignCheck:
     def contradictions(self) -> tuple[str, ...]:
         """Redundant sensors of which one is turned, or wrong by a factor: by their gain, with what to correct."""
         gains = [f for f in self.findings or () if f.quantity.startswith("gain") and f.verdict != "untested"]
-        by_check = groupby(gains, lambda one: (one.check, _channel_of(one)))
         alone, alike = list[str](), dict[str, list[tuple[ConsistencyFinding, ...]]]()
-        for (check, _), ones in ((key, tuple(ones)) for key, ones in by_check):
-            other = counterpart(check)
+        for (check, _), group in groupby(gains, lambda one: (one.check, _channel_of(one))):
+            ones, other = tuple(group), counterpart(check)
             if other and _off_alike(ones):
                 alike.setdefault(other, []).append(ones)
             else:

@@ -230,7 +230,8 @@ def limit_peaks(
     def largest(block: slice) -> list[_Largest]:
         return [_Largest(demand, block.start) for demand in demands(block)]
 
-    first, *others = by_threads(largest, row_blocks(len(motion.displacement)))
+    with np.errstate(all="ignore"):  # a pose beyond all reach exceeds every stroke: infinite
+        first, *others = by_threads(largest, row_blocks(len(motion.displacement)))
     for block in others:
         for so_far, found in zip(first, block, strict=True):
             so_far.raise_to(found)
@@ -308,12 +309,7 @@ def _parts_of(
 ) -> PartCheck:
     """Demands of parts of some samples of a motion, scaled."""
     moved = [x[some] for x in (motion.displacement, motion.velocity, motion.acceleration)]
-
-    def demands(block: slice) -> Sequence[Demand]:
-        with np.errstate(all="ignore"):  # a pose beyond all reach exceeds every stroke: infinite
-            return check(*(factor * x[block] for x in moved))
-
-    return demands
+    return lambda block: check(*(factor * x[block] for x in moved))
 
 
 def _deciding(motion: Motion, check: MotionCheck, factor: float, some: np.ndarray | slice = slice(None)) -> np.ndarray:
@@ -324,7 +320,8 @@ def _deciding(motion: Motion, check: MotionCheck, factor: float, some: np.ndarra
         shares = [column for demand in demands(block) if demand.decides for column in np.abs(demand.share).T]
         return _magnitudes(reduce(np.maximum, shares)) if shares else np.zeros(block.stop - block.start)
 
-    return np.concatenate([np.zeros(0), *by_threads(largest, row_blocks(count))])
+    with np.errstate(all="ignore"):  # as in `limit_peaks`
+        return np.concatenate([np.zeros(0), *by_threads(largest, row_blocks(count))])
 
 
 def _magnitudes(shares: np.ndarray) -> np.ndarray:

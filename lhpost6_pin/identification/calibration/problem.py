@@ -63,16 +63,17 @@ def _steps(every: Sequence[FreeParameter | SensorUnknown], share: float) -> Arra
     delays, unequal steps would seem to tell its parts apart: a valve's delay is added, a sensor's removed.
     """
     steps = np.array([one.step or share * one.sd for one in every])
-    late: dict[int, float] = {}
-    for i, one in enumerate(every):
-        if isinstance(one, FreeParameter):
-            late |= {i: one.slope(0.0)} if one.name.endswith(".valve_delay") else {}
-        elif one.kind == "delay":
-            late[i] = -1.0
-    shift = min((abs(steps[i] * slope) for i, slope in late.items()), default=0.0)
-    for i, slope in late.items():
-        steps[i] = shift / slope
+    later = np.array([_later(one) for one in every])
+    if (late := later != 0.0).any():
+        steps[late] = np.abs(steps * later)[late].min() / later[late]
     return steps
+
+
+def _later(one: FreeParameter | SensorUnknown) -> float:
+    """Time by which a channel comes later per unit of a coordinate; zero of what is no delay."""
+    if isinstance(one, SensorUnknown):
+        return -1.0 if one.kind == "delay" else 0.0
+    return one.slope(0.0) if one.name.endswith(".valve_delay") else 0.0
 
 
 class Problem:

@@ -40,7 +40,6 @@ from .margins import (
     linear_table,
     loop_frequencies,
     make_loop_model,
-    margins,
     without_dry_friction,
 )
 from .stability import check_loop
@@ -158,7 +157,7 @@ def tune(machine: Machine, settings: ControllerSettings, *, progress: Progress |
         return noise_target((axis,), machine.limits, seed=2, slow=True)
 
     responses = identify_axes(controllers, job.rest, unseen, job.numbers.number("noise.slow_segment"))
-    new, *old = (margins(job.model, controller) for controller in controllers)
+    new, *old = (check_loop(controller).margins for controller in controllers)
     job.done(11)
     limits = targets.decibels, targets.coherence
     found = []

@@ -14,7 +14,8 @@ import pytest
 import lhpost6_pin
 from lhpost6_pin.control import controlled, load_controller
 from lhpost6_pin.core import compiled as module
-from lhpost6_pin.core.compiled import VECTOR, borrowed, cache_folder, compiled, compiled_views, entry_point
+from lhpost6_pin.core.compiled import VECTOR, cache_folder, compiled, compiled_inline, entry_point
+from lhpost6_pin.core.packed import array_view, table_view
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.simulation.compile_ahead import SIGNATURES
 from lhpost6_pin.simulation.simulate import ClosedLoop, simulate
@@ -80,7 +81,12 @@ def test_no_module_is_touched_and_an_edit_is_never_met_by_stale_code_not_even_in
 
 def test_the_key_follows_what_compiled_code_is_made_of_and_nothing_else(copy: Path):
     keys = [outcome(KEY, copy)]
-    for edited in ("laws/stribeck.py", "effects/evaluate.py", "effects/registry.py"):  # a law, a caller, constants
+    for edited in (
+        "laws/stribeck.py",
+        "effects/evaluate.py",
+        "effects/registry.py",
+        "core/packed.py",
+    ):  # a law, a caller, constants, views
         with (copy / edited).open("a") as handle:
             handle.write("# edited\n")
         keys.append(outcome(KEY, copy))
@@ -178,32 +184,61 @@ def test_what_is_compiled_ahead_of_a_run_is_what_its_steps_call():
         assert signature in function.signatures, function.__name__
 
 
-@compiled_views
-def _halves(values):  # type: ignore[no-untyped-def]
-    values = borrowed(values)
-    return values[: values.size // 2], values[values.size // 2 :].reshape((1, -1))
+_PAIR = np.dtype([("left", np.float64), ("right", np.float64, (2,))])
+
+
+@compiled_inline
+def _parts(packed):  # type: ignore[no-untyped-def]
+    count = packed.size // 2
+    return array_view(packed, 0, (count // 2, 2)), table_view(packed, _PAIR, count, packed.size)
 
 
 @compiled
-def _swap_sums(values):  # type: ignore[no-untyped-def]
-    first, second = _halves(values)
-    first[0], second[0, 0] = second.sum(), first.sum()
+def _exchange(packed):  # type: ignore[no-untyped-def]
+    """Row sums of the first half of a packed array into the records of its second, and their sums into its first."""
+    numbers, pairs = _parts(packed)
+    for i in range(pairs.size):
+        total = pairs[i].left + pairs[i].right[0] + pairs[i].right[1]
+        pairs[i].left = numbers[i].sum()
+        numbers[i, 1] = total
 
 
-def test_views_of_a_borrowed_array_are_of_its_memory_and_do_not_free_it():
+def test_views_of_a_packed_array_are_of_its_memory_and_do_not_free_it():
     """The array keeps its only reference, whatever the number of calls: neither leaked nor freed."""
-    values, expected, held = np.arange(6.0), np.arange(6.0), []
+    values, expected, held = np.arange(12.0), np.arange(12.0), []
+    numbers, pairs = expected[:6].reshape(3, 2), expected[6:].view(_PAIR)
     for _ in range(3):
-        _swap_sums(values)
+        _exchange(values)
         held.append(sys.getrefcount(values))
-        expected[0], expected[3] = expected[3:].sum(), expected[:3].sum()
+        sums = numbers.sum(axis=1)[:2]
+        numbers[:2, 1] = pairs["left"] + pairs["right"].sum(axis=1)
+        pairs["left"] = sums
     assert held == [held[0]] * 3
     np.testing.assert_array_equal(values, expected)
 
 
 def test_an_entry_point_gives_what_the_function_gives():
-    direct = entry_point(_swap_sums, (VECTOR,))
-    one, other = np.arange(6.0), np.arange(6.0)
+    direct = entry_point(_exchange, (VECTOR,))
+    one, other = np.arange(12.0), np.arange(12.0)
     direct(one)
-    _swap_sums(other)
+    _exchange(other)
     np.testing.assert_array_equal(one, other)
+
+
+@compiled
+def _square(x):  # type: ignore[no-untyped-def]
+    return x * x
+
+
+@compiled
+def _fourth_power(x):  # type: ignore[no-untyped-def]
+    return _square(_square(x))
+
+
+def test_what_compiled_code_calls_is_compiled_without_a_wrapper_and_can_still_be_called_from_python():
+    """In either order: numba finds a function's copy for compiled code through two of its dispatcher's methods."""
+    assert _fourth_power(3.0) == 81.0
+    assert not _square.signatures, "the copy that Python calls was compiled for compiled code"
+    assert _square(3.0) == 9.0
+    assert _square.signatures
+    assert _fourth_power(3) == 81

@@ -23,8 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.arrays import Array
-from ..core.compiled import INTEGER, MATRIX, VECTOR, borrowed, compiled, compiled_inline, compiled_views
+from ..core.compiled import INTEGER, MATRIX, VECTOR, compiled, compiled_inline, compiled_source
 from ..core.names import SAMPLE_RATE
+from ..core.packed import array_view, table_view
 from ..laws.orifice import spool_for_opening
 from ..mechanics.accelerometers import composed_acceleration
 from ..mechanics.pose import gauss_newton_step, leg_jacobian, pose_acceleration
@@ -121,20 +122,19 @@ def pack_control(
 _AXIS_SIZE, _ACTUATOR_SIZE, _CANCELLER_SIZE = (d.itemsize // 8 for d in (AXIS, ACTUATOR, CANCELLER))
 
 
-@compiled_views
+@compiled_inline
 def unpack_control(packed):
     """Tables of a controller from `ControlTables.packed`, which the caller holds."""
-    packed = borrowed(packed)
     axes, n, cancellers = int(packed[0]), int(packed[1]), int(packed[2])
     actuator = 3 + _AXIS_SIZE * axes
     balance = actuator + _ACTUATOR_SIZE * n
     canceller = balance + n * n
     return ControlTables(
-        packed,
-        packed[3:actuator].view(AXIS),
-        packed[actuator:balance].view(ACTUATOR),
-        packed[balance:canceller].reshape((n, n)),
-        packed[canceller : canceller + _CANCELLER_SIZE * cancellers].view(CANCELLER),
+        array_view(packed, 0, (packed.size,)),
+        table_view(packed, AXIS, 3, actuator),
+        table_view(packed, ACTUATOR, actuator, balance),
+        array_view(packed, balance, (n, n)),
+        table_view(packed, CANCELLER, canceller, canceller + _CANCELLER_SIZE * cancellers),
     )
 
 
@@ -206,7 +206,7 @@ def cancel(canceller, sample, a, error, level, weights):
     return correction
 
 
-@compiled
+@compiled_source
 def control_step(sample, drive, feedback, tables, control, memory, command):
     """Fill command (n_actuators,) of one sample; memory is the controller's state, changed in place.
 
@@ -303,7 +303,7 @@ def sense(tables, ws, feedback):
         composed_acceleration(tables.accelerometers, ws.frame, tables.axes, v, a, gravity, feedback.acceleration)
 
 
-@compiled
+@compiled_source
 def control_sample(sample, drive, tables, ws, control, memory, command, window):
     """One controller sample of a run: sensors, command, and the delayed spools of its model steps.
 

@@ -21,13 +21,11 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
-from numba.core.cgutils import get_null_value
-from numba.extending import intrinsic
 
 from .files import refuse_folder
 
 __all__ = ["INTEGER", "MATRIX", "SCALAR", "VECTOR"]
-__all__ += ["borrowed", "cache_folder", "compiled", "compiled_inline", "compiled_views", "copy_scaled", "entry_point"]
+__all__ += ["cache_folder", "compiled", "compiled_inline", "compiled_source", "copy_scaled", "entry_point"]
 
 log = logging.getLogger(__name__)
 
@@ -36,6 +34,7 @@ INTEGER, SCALAR, VECTOR, MATRIX = numba.int64, numba.float64, numba.float64[::1]
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 _CONSTANT_IMPORT = re.compile(r"^from (\.+)([\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
+_COMPILED = re.compile(rb"^@(compiled|intrinsic)", re.MULTILINE)
 _KEEP = 4
 """Number of cache folders of older sources that are kept, newest first."""
 _ROOM = 50e6
@@ -55,9 +54,9 @@ def source_key() -> str:
 
 
 def _compiled_sources(package: Path) -> set[Path]:
-    """Modules with a compiled function, and those whose constants (names in capitals) they import."""
+    """Modules with a compiled or intrinsic function, and those whose constants (names in capitals) they import."""
     found: set[Path] = set()
-    remaining = [p for p in package.rglob("*.py") if b"@compiled" in p.read_bytes()]
+    remaining = [p for p in package.rglob("*.py") if _COMPILED.search(p.read_bytes())]
     while remaining:
         source = remaining.pop()
         if source in found:
@@ -106,30 +105,17 @@ def compiled_inline(function: _F) -> _F:
     """As `compiled`, inlined in every compiled caller: for parts of a step that return numbers and make no array.
 
     An array argument is seven words: to pass a dozen of them once a step costs as much as the work of the function, and
-    so does counting references; the caller holds the arrays, so none may be returned.
+    so does counting references; the caller holds the arrays, so none may be returned. Views of `core.packed` may.
     """
     return _jit(function, forceinline=True, _nrt=False)
 
 
-def compiled_views(function: _F) -> _F:
-    """As `compiled`, inlined in every caller, compiled as well: for one that returns views of `borrowed` arguments."""
-    return _jit(function, forceinline=True)
+def compiled_source(function: _F) -> _F:
+    """As `compiled`, its source inlined in compiled callers: for a part that a run compiles in one caller only.
 
-
-@intrinsic
-def borrowed(_context: Any, array: Any) -> Any:
-    """View of an array that the caller holds, within compiled code.
-
-    It has no owner: neither this view nor those made of it count references, which are atomic operations and, for
-    two dozen views a step, cost as much as the step's own arithmetic.
+    As such it is compiled once; a part called, or inlined by `compiled_inline`, is compiled for itself as well.
     """
-
-    def make(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        view = context.make_array(signature.return_type)(context, builder, arguments[0])
-        view.meminfo, view.parent = get_null_value(view.meminfo.type), get_null_value(view.parent.type)
-        return view._getvalue()
-
-    return array(array), make
+    return _jit(function, inline="always")
 
 
 def entry_point(function: Callable[..., Any], types: tuple[Any, ...]) -> Callable[..., Any]:
@@ -140,16 +126,31 @@ def entry_point(function: Callable[..., Any], types: tuple[Any, ...]) -> Callabl
     return cast(Any, function).compile(types)
 
 
-def _jit(function: _F, **more: bool) -> _F:
+def _jit(function: _F, **more: Any) -> _F:
+    """Compiled function; where compiled code calls it, of a second copy without the wrapper for calls from Python.
+
+    The wrapper is a fifth of what a function takes to compile, and most are called by compiled code alone. Both copies
+    are compiled at their first call, each with a cache of its own.
+    """
+    called = _dispatcher(function, "", more)
+    part = cache(lambda: _dispatcher(function, "parts", {**more, "no_cpython_wrapper": True}))
+    # what numba asks the function that compiled code names, for types and for code; without this it would work as well
+    called.get_call_template = lambda args, kws: part().get_call_template(args, kws)
+    called.get_overload = lambda signature: part().get_overload(signature)
+    return cast(_F, called)
+
+
+def _dispatcher(function: Callable[..., Any], subfolder: str, more: dict[str, Any]) -> Any:
+    """Dispatcher of numba for a function, with its cache in a subfolder."""
     folder = cache_folder()
     config = cast(Any, numba.config)
     before = config.CACHE_DIR
-    config.CACHE_DIR = "" if folder is None else str(folder)
+    config.CACHE_DIR = "" if folder is None else str(folder / subfolder)
     fastmath = {"contract", "nsz", "arcp"}
     options: Any = {"error_model": "numpy", "nogil": True, "fastmath": fastmath, **more}
     options["no_cfunc_wrapper"] = True  # nothing calls compiled functions from C; each wrapper is compiled, too
     try:
-        return cast(_F, numba.njit(cache=folder is not None, **options)(function))
+        return numba.njit(cache=folder is not None, **options)(function)
     finally:
         config.CACHE_DIR = before
 

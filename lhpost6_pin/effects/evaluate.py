@@ -8,7 +8,7 @@ supply the shared supply (`laws.supply.Supply`), force (n_rows, 3) the ledger: f
 and third port [N or N m], port_force (n_ports,) their sum per port.
 """
 
-from ..core.compiled import compiled, compiled_inline
+from ..core.compiled import compiled, compiled_inline, compiled_source
 from ..laws.supply import varies
 from .actuator import advance_actuator, advance_modified, fill_rates
 from .dispatch import advance_called, advance_inlined, apply_forces, rates
@@ -32,7 +32,7 @@ def state_rates(rows, s, sd, spool, supply, z, zd):
             rates(row, s, sd, z, zd)
 
 
-@compiled_inline
+@compiled_source
 def advance_states(rows, s, ds, dt, spool, supply, z):
     """Advance z in place over one step in which the ports move by ds from s (scheme `semi_implicit`).
 

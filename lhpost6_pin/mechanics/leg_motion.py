@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from ..core.cholesky import solve_positive
-from ..core.compiled import compiled, compiled_views, copy_scaled
+from ..core.compiled import compiled, compiled_source, copy_scaled
 from .ports import platen_pose
 from .schemes import set_twist
 from .spatial import cross, from_body, to_body
@@ -29,7 +29,7 @@ def _set_row(G, n, frame, rho, scale, axis, e):
     G[n, 3], G[n, 4], G[n, 5] = cross(rho, (scale * x, scale * y, scale * z))
 
 
-@compiled_views
+@compiled_source
 def leg_joints(buffer):
     """Positions, velocities and bias accelerations (n,), and the Jacobian (n, 6), of a buffer of 9 n numbers."""
     n = buffer.size // 9

@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from ..core.compiled import compiled, compiled_inline
+from ..core.compiled import compiled, compiled_inline, compiled_source
 from ..core.errors import SimulationError, UnknownNameError
 from ..core.names import SAMPLE_RATE, SCHEMES
 from ..effects.evaluate import advance_states, apply_forces, state_rates, wrench_on_platen
@@ -137,7 +137,7 @@ def kick(motion, acceleration, dt):
         motion[DQ, k] = dt * motion[V_MID, k]
 
 
-@compiled_inline
+@compiled_source
 def staggered_stage(q, dt, tables, ws, spool):
     """Semi-implicit, after the drift to q: hidden states over the step, then forces at its end.
 
@@ -165,7 +165,7 @@ def staggered_stage(q, dt, tables, ws, spool):
     return 0
 
 
-@compiled
+@compiled_source
 def rates_stage(q, z, tables, ws, spool):
     """Euler, RK4: forces and rates of hidden states at (q, V_SEEN, z), which need not be those of ws."""
     status = pose_stage(q, tables, ws)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.arrays import Array
-from ..core.compiled import borrowed, compiled_views
+from ..core.compiled import compiled_inline
+from ..core.packed import array_view, table_view
 from ..effects.registry import ROW
 from ..laws.supply import Supply
 from .forward_dynamics import INERTIA
@@ -59,27 +60,26 @@ def pack_tables(
     return Tables._make([packed, *parts[:-1], others[-1]])
 
 
-@compiled_views
+@compiled_inline
 def unpack_tables(packed):
     """Tables from `Tables.packed`, which the caller holds."""
-    packed = borrowed(packed)
-    at = packed[: _PARTS + 1].view(np.int64)
-    values = packed[at[13] : at[14]]
+    at = table_view(packed, np.int64, 0, _PARTS + 1)
+    values = array_view(packed, at[13], (9,))
     supply = Supply(values[0], values[1], values[2], values[3], values[4], values[5], values[6], values[7], values[8])
     return Tables(
-        packed,
-        packed[at[0] : at[1]].view(np.int64),
-        packed[at[1] : at[2]].view(LEG),
-        packed[at[2] : at[3]].view(BODY),
-        packed[at[3] : at[4]].view(ROW),
-        packed[at[4] : at[5]],
-        packed[at[5] : at[6]].view(np.int64),
-        packed[at[6] : at[7]],
-        packed[at[7] : at[8]].view(INERTIA),
-        packed[at[8] : at[9]].view(SPRING),
-        packed[at[9] : at[10]].view(MODE),
-        packed[at[10] : at[11]],
-        packed[at[11] : at[12]],
-        packed[at[12] : at[13]].view(PLACE),
+        table_view(packed, np.float64, 0, packed.size),
+        table_view(packed, np.int64, at[0], at[1]),
+        table_view(packed, LEG, at[1], at[2]),
+        table_view(packed, BODY, at[2], at[3]),
+        table_view(packed, ROW, at[3], at[4]),
+        table_view(packed, np.float64, at[4], at[5]),
+        table_view(packed, np.int64, at[5], at[6]),
+        table_view(packed, np.float64, at[6], at[7]),
+        table_view(packed, INERTIA, at[7], at[8]),
+        table_view(packed, SPRING, at[8], at[9]),
+        table_view(packed, MODE, at[9], at[10]),
+        table_view(packed, np.float64, at[10], at[11]),
+        table_view(packed, np.float64, at[11], at[12]),
+        table_view(packed, PLACE, at[12], at[13]),
         supply,
     )

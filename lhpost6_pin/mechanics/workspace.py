@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.compiled import borrowed, compiled_views
+from ..core.compiled import compiled_inline
+from ..core.packed import array_view
 from ..effects.registry import PORTS
 from .plant import Plant, State
 from .schemes import V
@@ -49,10 +50,9 @@ def make_workspace(plant: Plant, start: State) -> Workspace:
     return ws
 
 
-@compiled_views
+@compiled_inline
 def unpack_workspace(buffer):
     """Workspace from its buffer, which the caller holds."""
-    buffer = borrowed(buffer)
     nq, states, nv = int(buffer[0]), int(buffer[1]), int(buffer[2])
     n, rows, modes = int(buffer[3]), int(buffer[4]), int(buffer[5])
     z = _HEAD + nq
@@ -65,15 +65,15 @@ def unpack_workspace(buffer):
     external = force + 3 * rows
     modal = external + 6
     return Workspace(
-        buffer,
-        buffer[_HEAD:z],
-        buffer[z:zd],
-        buffer[zd:motion],
-        buffer[motion:port].reshape((7, nv)),
-        buffer[port:JB].reshape((4, n)),
-        buffer[JB:frame].reshape((2, n, 6)),
-        buffer[frame:force].reshape((8, 3)),
-        buffer[force:external].reshape((rows, 3)),
-        buffer[external:modal],
-        buffer[modal : modal + 4 * modes].reshape((4, modes)),
+        array_view(buffer, 0, (buffer.size,)),
+        array_view(buffer, _HEAD, (nq,)),
+        array_view(buffer, z, (states,)),
+        array_view(buffer, zd, (states,)),
+        array_view(buffer, motion, (7, nv)),
+        array_view(buffer, port, (4, n)),
+        array_view(buffer, JB, (2, n, 6)),
+        array_view(buffer, frame, (8, 3)),
+        array_view(buffer, force, (rows, 3)),
+        array_view(buffer, external, (6,)),
+        array_view(buffer, modal, (4, modes)),
     )

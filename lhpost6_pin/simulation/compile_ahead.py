@@ -21,9 +21,9 @@ LONGEST = 300.0
 """Time that the step is waited for [s]: several times what it takes on a slow machine."""
 
 
-SIGNATURES = {control_packed: CONTROL_TYPES, staggered_packed: STAGGERED_TYPES, log_packed: LOG_TYPES}
-"""What a step calls from Python, with the types of its arguments, in the order in which it is compiled: last what has
-parts in common with the equilibrium, which the first process compiles meanwhile."""
+SIGNATURES = {log_packed: LOG_TYPES, control_packed: CONTROL_TYPES, staggered_packed: STAGGERED_TYPES}
+"""What a step calls from Python, with the types of its arguments, in the order in which it is compiled: kinematics and
+forces of the stage late, because the first process needs them for the equilibrium and compiles them meanwhile."""
 
 
 def compile_ahead() -> "subprocess.Popen[bytes] | None":
@@ -32,7 +32,7 @@ def compile_ahead() -> "subprocess.Popen[bytes] | None":
     Wait for its end (`wait_for`) before the first step. It goes on if this process ends: the next run finds the code.
     """
     folder = cache_folder()
-    if folder is None or (os.cpu_count() or 1) < 2 or any(folder.rglob(f"*.{log_packed.__name__}-*.nbi")):
+    if folder is None or (os.cpu_count() or 1) < 2 or any(folder.rglob(f"*.{staggered_packed.__name__}-*.nbi")):
         return None
     code = f"from {__name__} import compile_step; compile_step()"
     return subprocess.Popen([sys.executable, "-P", "-c", code], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

@@ -57,6 +57,13 @@ def test_calibrate_names_the_option(lhpost6, own):
     assert refused(lhpost6("calibrate", own), "has labels AX", "or name its machine with --machine")
 
 
+def test_labels_of_what_the_machine_has_none_of_are_no_wrong_order(machine):
+    struts = {"strut_pressure": np.full((4, 3), 1.5e7)}
+    record = make_record(np.arange(4) / 512.0, struts, {"strut": ["S1", "S2", "S3"]}, {})
+    found = [str(f) for f in check_dataset(record, load_machine("uniaxial")) if f.severity == "error"]
+    assert len(found) == 1 and "the machine has none" in found[0] and "record's own machine" in found[0]
+
+
 def test_a_wrong_order_of_the_machines_own_labels_is_no_other_machine(machine):
     names = list(machine.actuator_names)
     record = make_record(

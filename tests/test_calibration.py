@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from commands import refused
 
 from lhpost6_pin.control import load_controller
@@ -28,9 +29,9 @@ from lhpost6_pin.identification.calibration.free_parameters import FreeParameter
 from lhpost6_pin.identification.calibration.normal_equations import bounded_step, bounds_of
 from lhpost6_pin.identification.calibration.operating_point import OperatingPoint
 from lhpost6_pin.identification.calibration.override import save_override
-from lhpost6_pin.identification.calibration.prepare import policy_of
+from lhpost6_pin.identification.calibration.prepare import policy_of, prepare_problem
 from lhpost6_pin.identification.calibration.problem import Problem, ResidualBands
-from lhpost6_pin.identification.calibration.result import contradictions
+from lhpost6_pin.identification.calibration.result import changed_parameters, contradictions
 from lhpost6_pin.identification.calibration.sensor_errors import corrected, corrected_record, sensor_unknowns
 from lhpost6_pin.identification.calibration.simulated_residuals import by_simulation
 from lhpost6_pin.identification.calibration.whitened_residuals import (
@@ -46,7 +47,10 @@ from lhpost6_pin.identification.residuals import RESIDUALS, evaluate_residuals
 from lhpost6_pin.machine.machine import Machine, build_machine, load_machine
 from lhpost6_pin.machine.parameters import load_parameters
 from lhpost6_pin.mechanics.plant import make_plant
+from lhpost6_pin.motions import Target, find_motion, make_target
+from lhpost6_pin.simulation.rehearse import rehearse
 from lhpost6_pin.simulation.simulated_campaign import simulate_campaign
+from lhpost6_pin.tuning.identify import noise_target
 
 pytestmark = pytest.mark.long
 
@@ -550,6 +554,28 @@ def test_simulation_is_a_second_opinion_that_agrees(found, truth):
     assert len(off) > 25  # of 37 parameters
     assert np.median(np.abs(off)) < 1.2
     assert np.abs(off).max() < 5.0  # errors of the sensors, held, are only in the floor
+
+
+def exact(machine: Machine, target: Target) -> xr.Dataset:
+    """A test simulated without sensors."""
+    return rehearse(machine, target, load_controller("lhpost6"), attrs={}, engine="fused", record_every=4).record
+
+
+def test_noise_that_a_test_does_not_have_is_not_subtracted(machine, sensors, campaign):
+    records = [exact(machine, noise_target(("x",), machine.limits, duration=12.0)), campaign.records[1]]
+    problem = prepare_problem(machine, records, sensors, calibration_numbers())
+    tests = [test.motion.acceleration for test in problem.tests]
+    for replica in problem.again:
+        more = [test.motion.acceleration for test in replica]
+        assert np.array_equal(more[0], tests[0]) and not np.array_equal(more[1], tests[1])
+
+
+@pytest.mark.slow
+def test_a_test_without_noise_changes_nothing_of_the_machine_that_made_it(machine, sensors):
+    """Noise that was not there was subtracted from the normal equations: inertias "changed" by up to 8 %."""
+    found = calibrate(machine, [exact(machine, make_target(find_motion("ridgecrest"), scale=0.8))], sensors)
+    assert found.converged
+    assert [found.names[i] for i in changed_parameters(found)] == []
 
 
 @pytest.mark.slow  # a whole campaign

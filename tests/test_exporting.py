@@ -98,6 +98,20 @@ def test_what_a_record_holds_beyond_the_layout_is_exported_too(tmp_path, record)
     assert raw.names[-2:] == ("extra_0 [m]", "extra_1 [m]")
 
 
+def test_columns_of_different_units_are_exported_and_listed_with_their_own(tmp_path, record):
+    """Moments of a specimen were labelled N, and shared a range with its forces."""
+    labels, units = ["fx", "mx"], {"units": "N, N m", "column_units": "N, N m"}
+    wrench = xr.DataArray(
+        np.outer(1.0 + np.arange(512.0), [1.0, -1.0]), {"interface_axis": labels}, ("time", "interface_axis")
+    )
+    more = record.assign(specimen_wrench=wrench.assign_attrs(units))
+    export_record(more, tmp_path / "run.csv", "csv")
+    (raw,) = load_raw(tmp_path / "run.csv")
+    assert raw.names[-2:] == ("specimen_wrench_fx [N]", "specimen_wrench_mx [N m]")
+    said = [str(f) for f in check_dataset(more, load_machine()) if "specimen_wrench" in str(f)]
+    assert len(said) == 2 and "N, 512 x 1, 1 to 512" in said[0] and "N m, 512 x 1, -512 to -1" in said[1]
+
+
 def test_an_unknown_format_a_broken_record_and_a_missing_package_are_refused(tmp_path, record, monkeypatch):
     with pytest.raises(UnknownNameError, match="csv, mat, parquet"):
         export_record(record, tmp_path / "run.xls", "xls")

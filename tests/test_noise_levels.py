@@ -15,6 +15,7 @@ from sensor_cases import with_change
 
 from lhpost6_pin.control import load_controller
 from lhpost6_pin.core.errors import RecordError
+from lhpost6_pin.core.names import SAMPLE_RATE
 from lhpost6_pin.data.campaign_check import check_campaign
 from lhpost6_pin.data.check import check_dataset
 from lhpost6_pin.data.consistency import check_sensors
@@ -345,6 +346,22 @@ def test_a_turned_force_is_found_in_a_slow_sine_in_which_friction_hides_inertia(
     (turned,) = with_change([record], "actuator_force", lambda x: x * signs)
     (found,) = turned_signs(turned, machine)
     assert found.channel == f"actuator_force[{machine.actuator_names[column]}]" and "takes energy" in found.message
+
+
+def test_a_platen_that_settles_does_not_take_energy_by_forces_of_turned_sign():
+    """After a move along z it rose by 16 um in 8 s, against a force that fell: all six signs were called turned."""
+    machine = load_machine()
+    move = sine_target("z", 0.06, 0.25)[0]
+    still = np.zeros((20 * SAMPLE_RATE, 6))
+    held = {n: np.vstack([getattr(move, n), still]) for n in ("displacement", "velocity", "acceleration")}
+    longer = replace(move, time=np.arange(len(held["velocity"])) / SAMPLE_RATE, **held)
+    run = rehearse(machine, longer, load_controller("lhpost6"), attrs={}, engine="fused", record_every=8).record
+    rate, found = SAMPLE_RATE // 8, []
+    for after in range(5, 13):
+        rest = run.isel(time=slice((after - 20) * rate, (after - 12) * rate or None))
+        assert 0.0 < np.ptp(rest["platen_displacement"].values[:, 2]) < 1e-4
+        found += turned_signs(rest.assign_coords(time=rest["time"] - rest["time"][0]), machine)
+    assert not found
 
 
 def test_an_actuator_that_takes_what_the_others_give_is_not_turned():

@@ -217,7 +217,7 @@ def test_joints_of_an_articulated_specimen_are_recorded():
     record = record_of_run(run, {})
     joint = record["specimen_joint_position"]
     assert record.attrs["specimen"] == "pendulum"
-    assert list(joint["specimen_joint"].values) == ["pivot"] and joint.attrs["joint_units"] == "rad"
+    assert list(joint["specimen_joint"].values) == ["pivot"] and joint.attrs["column_units"] == "rad"
     cosine_and_sine = np.stack([np.cos(joint[:, 0]), np.sin(joint[:, 0])], axis=1)
     np.testing.assert_allclose(cosine_and_sine, run.q[:, 7:], rtol=0.0, atol=1e-12)  # rounding
     assert joint[0, 0] == 0.0 and np.abs(joint).max() > 1e-4  # it swings

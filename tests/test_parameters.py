@@ -149,6 +149,16 @@ BAD = {
     "a return above the supply": (r"value = 550000.0", "value = 5.5e7", "return_pressure is not below"),
     "a component of no length": (r"\[4.89, 0.0, -6.0\]", "[4.89, 0.0, -2.43]", "S1: platen_point and base_point coin"),
     "a number outside any section": (r"^\[machine\]", "odd = 1\n[machine]", "odd stands outside any section"),
+    "a quantity outside any section": (
+        r"^\[machine\]",
+        "[odd]\nvalue = 1.0\n[machine]",
+        "odd stands outside any section",
+    ),
+    "a path in quotation marks": (
+        r"^\[machine\]",
+        "['kind.horizontal']\n[machine]",
+        "without quotation marks, or hori",
+    ),
     "a section that is a number": (r"^(\[component).H1\]", r"\1]\nH0 = 1\n\1.H1]", "component.H0 must be a sec"),
     "a path given twice": (r"^(\[kind).horizontal\]", r"\1.platen]\nmass = 1\n\1.horizontal]", "platen.mass is given"),
     "a chamber area on a 3-way valve": (

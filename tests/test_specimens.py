@@ -362,7 +362,7 @@ def test_the_record_holds_the_motion_of_the_points_by_name(frame):
     run = moved(load_machine().with_specimen("tall_column"), samples=64)
     record = record_of_run(run, {"test": "column"})
     assert list(record["specimen_point"].values) == ["top x", "top pitch", "top y", "top roll"]
-    assert record["specimen_acceleration"].attrs["point_units"] == "m/s2 rad/s2 m/s2 rad/s2"
+    assert record["specimen_acceleration"].attrs["column_units"] == "m/s2, rad/s2, m/s2, rad/s2"
     assert record.attrs["specimen"] == "tall_column"
     np.testing.assert_array_equal(record["specimen_displacement"], point_response(run)["displacement"])
     assert not any(name.startswith("hidden_specimen") for name in record)

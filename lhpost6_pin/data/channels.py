@@ -23,6 +23,7 @@ __all__ = [
     "calibrated_channels",
     "channel_name",
     "channel_unit",
+    "column_units",
     "columns_of",
     "residuals_of",
     "same_unit",
@@ -237,6 +238,14 @@ def channel_unit(channel: str, units: str | None = None) -> str:
     variable, _, label = channel.rstrip("]").partition("[")
     parts = (LAYOUT[variable].units if units is None else units).split(",")
     return parts[-1 if label in AXES[3:] else 0].strip()
+
+
+def column_units(variable: xr.DataArray) -> list[str]:
+    """Unit of every column of a variable along time: its own `column_units`, or by its `units` and the axis."""
+    if own := variable.attrs.get("column_units"):
+        return [unit.strip() for unit in str(own).split(",")]
+    units = str(variable.attrs.get("units", ""))
+    return [channel_unit(channel_name(variable, k), units) for k in range(columns_of(variable).shape[1])]
 
 
 _LIKELY_UNITS = {  # unit: least and greatest plausible peak, and the likely mistake outside

@@ -19,7 +19,7 @@ from ..core.names import AXES
 from ..machine.machine import Machine
 from ..machine.recorded_changes import changes_summary
 from .alignment import hydraulic_force
-from .channels import LAYOUT, channel_name, channel_unit, columns_of, unit_doubt
+from .channels import LAYOUT, channel_name, channel_unit, column_units, columns_of, unit_doubt
 from .conditioning import resolution
 from .filled_samples import filled_samples, longest_measured, stated_constants
 from .force_units import wrong_forces
@@ -137,12 +137,12 @@ def _contents(dataset: xr.Dataset) -> Iterator[_Warning]:
 def _extents(variable: xr.DataArray, further: str) -> Iterator[_Warning]:
     """Shape and range of a variable, of its columns of each unit apart."""
     units = str(variable.attrs.get("units", "no units"))
-    if variable.ndim != 2 or "," not in units or variable.dims[1] not in variable.coords:
+    several = "," in units or "column_units" in variable.attrs
+    if variable.ndim != 2 or not several or variable.dims[1] not in variable.coords:
         parts = [(str(variable.name), units, variable.values)]
     else:
         names = [str(label) for label in variable[variable.dims[1]].values]
-        each = [channel_unit(channel_name(variable, k), units) for k in range(len(names))]
-        parts = []
+        each, parts = column_units(variable), []
         for unit in dict.fromkeys(each):
             own = [k for k, other in enumerate(each) if other == unit]
             label = f"{variable.name}[{', '.join(names[k] for k in own)}]"

@@ -101,9 +101,13 @@ def _label_faults(dataset: xr.Dataset, wanted: Mapping[str, Sequence[str]]) -> I
     for dim, names in have.items():
         right = list(AXES if dim == "axis" else wanted.get(dim, _numbered(names)))
         if names != right:
+            what = f"has labels {' '.join(names)}"
+            if not right:
+                yield dim, None, f"{what}, and the machine has none", "name the record's own machine with --machine"
+                continue
             remedy = f"they must be {' '.join(right)}, in this order"
             other = dim in wanted and not set(names) <= set(right)
-            yield dim, None, f"has labels {' '.join(names)}", remedy + ", or name its machine with --machine" * other
+            yield dim, None, what, remedy + ", or name its machine with --machine" * other
         elif len(set(names)) < len(names):
             yield dim, None, f"has labels that repeat: {' '.join(names)}", "give each its own"
     some, every = have.get("horizontal", []), have.get("actuator", have.get("horizontal", []))

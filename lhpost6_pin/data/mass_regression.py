@@ -42,7 +42,7 @@ class MassFit(NamedTuple):
 def mass_fits(record: xr.Dataset, machine: Machine, numbers: Parameters) -> list[MassFit]:
     """Regress every force and pressure difference along whose actuator the platen moves; `numbers` as `rest_numbers`.
 
-    A record without motion, or slower than the band compared, has none.
+    A record without motion to and fro, or slower than the band compared, has none.
     """
     dt = sample_interval(record)
     low, high = numbers.vector("sign.band")
@@ -55,6 +55,7 @@ def mass_fits(record: xr.Dataset, machine: Machine, numbers: Parameters) -> list
     size = np.std(along, axis=0)
     opposite = _opposite(along, size, numbers.number("sign.opposite"))
     moving = size >= max(numbers.number("sign.moving") * size.max(), 1e-300)
+    moving &= np.mean(np.abs(speed), axis=0) >= numbers.number("sign.returns") * np.abs(np.mean(speed, axis=0))
     found = []
     for name, label, force in _forces(record, machine):
         i = machine.actuator_names.index(label)

@@ -255,8 +255,12 @@ def _sections(tree: Mapping[str, Any], file: str) -> Iterator[tuple[str, Mapping
     for name, table in tree.items():
         if name == "effect":
             continue  # `_effects` reads these
-        if not isinstance(table, dict):
-            raise ParameterError(f"{file}: {name} stands outside any section; put it under [machine] or [platen]")
+        if "." in name:
+            section, _, key = name.rpartition(".")
+            raise ParameterError(f'{file}: "{name}": write it without quotation marks, or {key} under [{section}]')
+        if not isinstance(table, dict) or "value" in table:
+            where = "put it under that of its part, as in [horizontal] or [platen]; `lhpost6 info` lists section.name"
+            raise ParameterError(f"{file}: {name} stands outside any section; {where}")
         if name not in _GROUPS:
             yield name, table
             continue

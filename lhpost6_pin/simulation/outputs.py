@@ -82,18 +82,19 @@ def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | 
         labels["specimen_point"] = tuple(point.name for point in points)
         turning = [point.direction.startswith("r") for point in points]
         for name, (unit, long_name) in _OF_POINTS.items():
-            units = " ".join(unit.replace("m", "rad") if turns else unit for turns in turning)
-            about = {"units": unit if not any(turning) else units, "long_name": long_name, "point_units": units}
+            units = ", ".join(unit.replace("m", "rad") if turns else unit for turns in turning)
+            about = {"units": unit if not any(turning) else units, "long_name": long_name, "column_units": units}
             channels[f"specimen_{name}"] = (("time", "specimen_point"), response[name], about)
     if plant.articulated:
         joints = specimen_joints(plant)
         about = {"units": "m or rad", "long_name": "position of the specimen's joints"}
-        about["joint_units"] = " ".join(joint.unit for joint in joints)
+        about["column_units"] = ", ".join(joint.unit for joint in joints)
         labels["specimen_joint"] = tuple(joint.name for joint in joints)
         channels["specimen_joint_position"] = (("time", "specimen_joint"), specimen_positions(plant, run.q), about)
     if machine.specimen is not None:
         about = {"units": "N, N m", "long_name": "wrench of the specimen on the platen at the interface, platen axes"}
         at = np.round(interface_lever(plant) - plant.body[0]["rho_c"], 12)
+        about["column_units"] = ", ".join(3 * ["N"] + 3 * ["N m"])
         about["interface"] = f"at {at[0]:g}, {at[1]:g}, {at[2]:g} m from C"
         labels["interface_axis"] = INTERFACE_AXES
         channels["specimen_wrench"] = (("time", "interface_axis"), interface_wrench(run), about)

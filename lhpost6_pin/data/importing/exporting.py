@@ -11,7 +11,7 @@ import xarray as xr
 from ...core.arrays import Array
 from ...core.errors import RecordError, UnknownNameError
 from ...core.files import write_whole
-from ..channels import LAYOUT_VERSION, channel_name, channel_unit, columns_of
+from ..channels import LAYOUT_VERSION, channel_name, column_units, columns_of
 from ..layout_faults import layout_faults
 from .raw import need_package
 from .raw_files import load_raw
@@ -27,10 +27,8 @@ def channel_units(record: xr.Dataset) -> Iterator[tuple[str, str, Array]]:
     for variable in record.data_vars.values():
         if variable.dims[:1] != ("time",) or variable.ndim > 2 or variable.dtype.kind not in "fiu":
             continue
-        units = str(variable.attrs.get("units", "-"))
-        for k, values in enumerate(columns_of(variable).T):
-            channel = channel_name(variable, k)
-            yield channel, channel_unit(channel, units) or "-", values
+        for k, (unit, values) in enumerate(zip(column_units(variable), columns_of(variable).T, strict=True)):
+            yield channel_name(variable, k), unit or "-", values
 
 
 def refuse_what_is_no_export(path: Path) -> None:

@@ -11,6 +11,7 @@ from ...core.errors import RecordError
 from ...data.channels import calibrated_channels, channel_name, columns_of
 from ...data.layout_faults import layout_faults
 from ...data.observable import observable
+from ...data.records import is_measured
 from ...data.sensors import SensorSet
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
@@ -79,7 +80,12 @@ def prepare_problem(
 
     tests = [carrying(prepare_test(plant, r, sensors, policy)) for r in records]
     noisy = [test for _ in range(int(n("fit.draws"))) for test in drawn(policy._replace(shares=False))]
-    again = [drawn(policy) for _ in range(int(n("fit.corrections")))]
+    # noise that a record does not have adds nothing to the normal equations, so nothing of it is subtracted
+    exact = {i: test for i, (r, test) in enumerate(zip(records, tests, strict=True)) if not is_measured(r)}
+    if exact:
+        free = "simulated without noise; weights and intervals are those of the noise that sensors %s state"
+        log.warning(f"%s: {free}", ", ".join(test.name for test in exact.values()), sensors.name)
+    again = [[exact.get(i, test) for i, test in enumerate(drawn(policy))] for _ in range(int(n("fit.corrections")))]
     problem = Problem(
         *(machine, tests, noisy, sensors, comparison),
         again=again, jobs=jobs, kinds=kinds, others=others(machine), delays=removed,

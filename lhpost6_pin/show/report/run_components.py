@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from ...core.arrays import Array
+from ...data.channels import column_units
 from ...data.metrics import channel, kinds, labels, peaks, sampling
 from ...simulation.limit_use import TOLERANCE, Limits, force_use, shares_of_limit
 from .page import Block, Figure, Table, bar, missing, number
@@ -84,7 +85,7 @@ def strut_blocks(record: xr.Dataset, limits: Limits) -> list[Block]:
 def specimen_blocks(record: xr.Dataset) -> list[Block]:
     """Return the positions of the free joints of the specimen; the record must have some."""
     values, names = channel(record, "specimen_joint_position"), labels(record, "specimen_joint")
-    units = str(record["specimen_joint_position"].attrs["joint_units"]).split()
+    units = column_units(record["specimen_joint_position"])
     rows = []
     for unit, title, scale in JOINTS:
         own = [k for k, its in enumerate(units) if its == unit]

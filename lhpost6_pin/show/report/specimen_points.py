@@ -2,6 +2,7 @@
 
 import xarray as xr
 
+from ...data.channels import column_units
 from ...data.metrics import channel, labels
 from .page import Block
 from .plots import Row, palette_traces
@@ -19,7 +20,7 @@ def point_blocks(record: xr.Dataset) -> list[Block]:
     names, rows = labels(record, "specimen_point"), []
     for quantity, unit, title in _SHOWN:
         values = channel(record, f"specimen_{quantity}")
-        units = str(record[f"specimen_{quantity}"].attrs["point_units"]).split()
+        units = column_units(record[f"specimen_{quantity}"])
         for its, scale in ((unit, quantity), (_TURNING[unit], f"rotation {quantity}".removesuffix(" displacement"))):
             own = [k for k, u in enumerate(units) if u == its]
             if own:

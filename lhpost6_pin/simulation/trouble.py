@@ -114,8 +114,9 @@ def run_doubts(run: Run, displacement: Array | None = None) -> list[str]:
     displacement (n, 6): that of C and Euler angles in this run, where it is known.
     """
     low, found = float(run.plant.supply[1]), []
-    empty = {one.chamber.place: one for one in _lowest(run, 0.0)}
-    for one in _lowest(run, low):
+    below = _lowest(run, low)
+    empty = {one.chamber.place: one for one in (_lowest(run, 0.0) if below else ())}
+    for one in below:
         chamber, at, least = empty.get(one.chamber.place, one)
         bound = "zero" if least < 0.0 else f"the return pressure of {low / 1e6:.3g} MPa"
         found.append(f"{chamber} fell to {least / 1e6:.3g} MPa, below {bound}, first at {at:.3f} s")

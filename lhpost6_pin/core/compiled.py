@@ -34,7 +34,8 @@ INTEGER, SCALAR, VECTOR, MATRIX = numba.int64, numba.float64, numba.float64[::1]
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 _CONSTANT_IMPORT = re.compile(r"^from (\.+)([\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
-_COMPILED = re.compile(rb"^@(compiled|intrinsic)", re.MULTILINE)
+_COMPILED = b"@compiled", b"@intrinsic"
+"""Marks of a module of compiled code."""
 _KEEP = 4
 """Number of cache folders of older sources that are kept, newest first."""
 _ROOM = 50e6
@@ -56,7 +57,8 @@ def source_key() -> str:
 def _compiled_sources(package: Path) -> set[Path]:
     """Modules with a compiled or intrinsic function, and those whose constants (names in capitals) they import."""
     found: set[Path] = set()
-    remaining = [p for p in package.rglob("*.py") if _COMPILED.search(p.read_bytes())]
+    texts = ((path, path.read_bytes()) for path in package.rglob("*.py"))
+    remaining = [path for path, text in texts if any(mark in text for mark in _COMPILED)]
     while remaining:
         source = remaining.pop()
         if source in found:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..core.arrays import Array, Mask
+from ..core.extremes import finite_peaks
 
 __all__ = ["PLACE", "at_rest"]
 
@@ -18,6 +19,6 @@ def at_rest(values: Array, largest: float = 0.0, place: bool = False) -> Mask:
 
     `place`: the values are displacements, which `PLACE` limits, too. Values that are not finite do not count.
     """
-    peak = np.where(np.isfinite(values), np.abs(values), 0.0).max(axis=0, initial=0.0)
+    peak = np.maximum(finite_peaks(values), 0.0)
     limit = SHARE * max(largest, peak.max(initial=0.0))
     return np.asarray(peak <= (max(limit, PLACE) if place else limit))

@@ -14,6 +14,7 @@ import xarray as xr
 
 from ..core.arrays import Array
 from ..core.errors import RecordError
+from ..core.extremes import finite_peaks
 from ..core.threads import by_threads
 from .at_rest import at_rest
 from .signals import Band, align, delay_within, rrmse
@@ -38,7 +39,6 @@ QUANTITIES = ("displacement", "velocity", "acceleration")
 SQUARED = float(np.sqrt(np.finfo(np.float64).tiny))  # smaller values have no representable square
 COMMANDED = 1e-3  # an axis is commanded if its peak target is at least this fraction of the largest (1 rad as 1 m)
 DRIFT_BAND = 0.2  # [Hz] the displacement error below this frequency is drift
-SIDE_BY_SIDE = 64  # rows that are reduced at once
 FEWEST = 64  # samples, below which no delay is sought and no tracking judged
 LONGEST_DELAY = 0.25  # [s] sought either way; ten times what such a table has
 END = 0.5  # [s] the residual offset is the mean error over this last part of the record
@@ -170,25 +170,8 @@ def drift(record: xr.Dataset) -> tuple[Array, float, Array] | None:
 
 def peaks(values: Array) -> Array:
     """Greatest finite |value| of each column (n, ...) -> (...); not-a-number for a column without any."""
-    few = _extremes(values)
-    size = np.maximum(few.max(axis=0), -few.min(axis=0))  # not finite where a value is not
-    if np.isfinite(size).all():
-        return np.asarray(size)
-    size = np.where(np.isfinite(values), np.abs(values), -np.inf).max(axis=0)
+    size = finite_peaks(values)
     return np.where(size >= 0.0, size, np.nan)
-
-
-def _extremes(values: Array) -> Array:
-    """Rows (m, ...) among which are the extremes of the columns of values (n, ...).
-
-    Many rows are reduced side by side: numpy is ten times as slow on rows of few numbers.
-    """
-    whole = len(values) // SIDE_BY_SIDE
-    if not whole:
-        return values
-    wide = values[: whole * SIDE_BY_SIDE].reshape(whole, -1)
-    found = [x.reshape(SIDE_BY_SIDE, *values.shape[1:]) for x in (wide.min(axis=0), wide.max(axis=0))]
-    return np.concatenate([*found, values[whole * SIDE_BY_SIDE :]])
 
 
 def peak_window(values: Array, step: float, duration: float) -> tuple[int, int] | None:

@@ -4,7 +4,7 @@ Its stages are those of the per-step engine; its rigid-body algebra is its own (
 tested against Pinocchio.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -156,6 +156,9 @@ LOG_TYPES = INTEGER, VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX
 """Types of the arguments of `log_packed`."""
 
 
+_staggered = compiled_inline(cast(Any, staggered_stage).py_func)  # without reference counts, which this loop has
+
+
 @compiled
 def run_fused(span, tables, ws, control, signals, log):
     """Run the samples of a span with tables and workspace of the plant and tables of the controller.
@@ -190,7 +193,7 @@ def run_fused(span, tables, ws, control, signals, log):
         for j in range(steps):
             if span.scheme == 0:
                 integrate(q, motion[DQ], tables.axes, q)
-                status = staggered_stage(q, dt, tables, ws, window[j])
+                status = _staggered(q, dt, tables, ws, window[j])
                 if status != 0:
                     break
                 _forward(tables, ws, work, a)

@@ -190,6 +190,8 @@ def _usable(run: Run) -> Run:
     Raises SimulationError with the run's trouble if fewer than two samples, the least of a record, remain.
     """
     arrays = (run.q, run.v, run.a, run.z, run.spool)
+    if all(np.isfinite(x).all() for x in arrays) and len(run.q) > 1:
+        return run
     finite = np.logical_and.reduce([np.isfinite(x).all(axis=1) for x in arrays])
     n = len(finite) if finite.all() else int(np.argmin(finite))
     if n < 2:

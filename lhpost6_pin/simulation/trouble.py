@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.arrays import Array
+from ..core.extremes import extremes
 from ..machine.components import Actuator
 from ..mechanics.plant import Plant
 from ..mechanics.pose import platen_motion
@@ -134,8 +135,9 @@ def run_doubts(run: Run, displacement: Array | None = None) -> list[str]:
 
 def _lowest(run: Run, level: float) -> list[_Low]:
     """Chambers that fell below a level [Pa]."""
-    least = np.fmin.reduce(run.z, axis=0)  # of all states: along rows, as a column apart is read far slower
-    found = []
+    least, found = extremes(run.z).min(axis=0), []
+    if np.isnan(least).any():
+        least = np.fmin.reduce(run.z, axis=0)
     for chamber in _chambers(run.plant):
         if least[chamber.place] < level:
             first = int((run.z[:, chamber.place] < level).argmax())

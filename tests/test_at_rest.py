@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from lhpost6_pin.core.extremes import extremes, finite_peaks
 from lhpost6_pin.core.names import AXES
 from lhpost6_pin.data.at_rest import at_rest
 from lhpost6_pin.data.metrics import commanded_axes, peaks, track
@@ -98,3 +99,17 @@ def test_peaks_are_those_of_all_rows(shape, gaps):
             values[rng.random(shape) < 0.1] = np.nan
         finite = np.where(np.isnan(values), -1.0, np.abs(values)).max(axis=0)
         np.testing.assert_array_equal(peaks(values), np.where(finite < 0.0, np.nan, finite))
+
+
+@pytest.mark.parametrize("count", [1, 63, 64, 65, 1000])
+@pytest.mark.parametrize("shape", [(), (1,), (3,), (2, 3)])
+def test_peaks_of_long_arrays_are_those_of_all_their_finite_samples(count, shape):
+    rng = np.random.default_rng(count)
+    for bad in (0, count // 3):
+        values = rng.standard_normal((count, *shape))
+        values.reshape(-1)[rng.choice(values.size, bad, replace=False)] = rng.choice([np.nan, np.inf, -np.inf], bad)
+        expected = np.where(np.isfinite(values), np.abs(values), -np.inf).max(axis=0)
+        np.testing.assert_array_equal(finite_peaks(values), expected)
+        if not bad:
+            np.testing.assert_array_equal(extremes(values).min(axis=0), values.min(axis=0))
+            np.testing.assert_array_equal(extremes(values).max(axis=0), values.max(axis=0))

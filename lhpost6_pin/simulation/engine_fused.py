@@ -4,7 +4,7 @@ Its stages are those of the per-step engine; its rigid-body algebra is its own (
 tested against Pinocchio.
 """
 
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
@@ -156,7 +156,16 @@ LOG_TYPES = INTEGER, VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX
 """Types of the arguments of `log_packed`."""
 
 
-_staggered = compiled_inline(cast(Any, staggered_stage).py_func)  # without reference counts, which this loop has
+@compiled_inline
+def _semi_implicit_step(dt, tables, ws, window, j, work, a):
+    """A step with row j of window (n_steps, n_actuators); without reference counts, which the loop around it has."""
+    motion, q = ws.motion, ws.q
+    integrate(q, motion[DQ], tables.axes, q)
+    status = staggered_stage(q, dt, tables, ws, window[j])
+    if status == 0:
+        _forward(tables, ws, work, a)
+        kick(motion, a, dt)
+    return status
 
 
 @compiled
@@ -192,12 +201,7 @@ def run_fused(span, tables, ws, control, signals, log):
         status = 0
         for j in range(steps):
             if span.scheme == 0:
-                integrate(q, motion[DQ], tables.axes, q)
-                status = _staggered(q, dt, tables, ws, window[j])
-                if status != 0:
-                    break
-                _forward(tables, ws, work, a)
-                kick(motion, a, dt)
+                status = _semi_implicit_step(dt, tables, ws, window, j, work, a)
             elif span.scheme == 1:
                 status = _euler_step(dt, tables, ws, window[j])
             else:

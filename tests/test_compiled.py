@@ -1,5 +1,6 @@
 """The cache of compiled code: private, fresh after an edit, shared by processes, and never a must."""
 
+import json
 import logging
 import os
 import shutil
@@ -15,6 +16,7 @@ import lhpost6_pin
 from lhpost6_pin.control import controlled, load_controller
 from lhpost6_pin.core import compiled as module
 from lhpost6_pin.core.compiled import VECTOR, cache_folder, compiled, compiled_inline, entry_point
+from lhpost6_pin.core.files import models_folder
 from lhpost6_pin.core.packed import array_view, table_view
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.simulation.compile_ahead import SIGNATURES
@@ -242,3 +244,13 @@ def test_what_compiled_code_calls_is_compiled_without_a_wrapper_and_can_still_be
     assert _square(3.0) == 9.0
     assert _square.signatures
     assert _fourth_power(3) == 81
+
+
+@pytest.mark.slow  # compiles a step
+def test_doctor_says_whether_the_step_was_compiled_or_loaded(copy: Path, tmp_path: Path):
+    """It asked the wrong one of two copies of a function, and would have said loaded after compiling for 20 s."""
+    command = "import sys; from lhpost6_pin.cli.app import main; sys.argv[1:] = ['doctor', '--json']; main()"
+    models = copy.parent / "models"
+    models.symlink_to(models_folder())
+    found = [json.loads(outcome(command, copy, LHPOST6_CACHE_DIR=str(tmp_path / "cache"))) for _ in range(2)]
+    assert [one["compiled_now"] for one in found] == [True, False]

@@ -93,10 +93,10 @@ def _time_first_step() -> tuple[float, bool]:
     from ..machine.machine import load_machine
     from ..mechanics.equilibrium import find_equilibrium
     from ..mechanics.plant import make_plant
-    from ..mechanics.schemes import staggered_stage
+    from ..simulation.engine_pinocchio import staggered_packed
     from ..simulation.simulate import OpenLoop, simulate
 
     plant = make_plant(load_machine())
     rest = find_equilibrium(plant)
     simulate(plant, OpenLoop(rest.spool[None, :].repeat(2, 0), rest.state), samples=2)
-    return time.perf_counter() - begin, bool(sum(staggered_stage.stats.cache_misses.values()))  # type: ignore[attr-defined]
+    return time.perf_counter() - begin, bool(sum(staggered_packed.stats.cache_misses.values()))  # type: ignore[attr-defined]

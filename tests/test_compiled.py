@@ -83,12 +83,8 @@ def test_no_module_is_touched_and_an_edit_is_never_met_by_stale_code_not_even_in
 
 def test_the_key_follows_what_compiled_code_is_made_of_and_nothing_else(copy: Path):
     keys = [outcome(KEY, copy)]
-    for edited in (
-        "laws/stribeck.py",
-        "effects/evaluate.py",
-        "effects/registry.py",
-        "core/packed.py",
-    ):  # a law, a caller, constants, views
+    # a law, a caller, constants, views
+    for edited in ("laws/stribeck.py", "effects/evaluate.py", "effects/registry.py", "core/packed.py"):
         with (copy / edited).open("a") as handle:
             handle.write("# edited\n")
         keys.append(outcome(KEY, copy))

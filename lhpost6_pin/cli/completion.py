@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable
 
 import typer
 
-from ..core.files import models_folder, read_toml
+from ..core.files import models_folder, read_toml, shipped
 
-__all__ = ["complete_motion", "completing", "effect_names"]
+__all__ = ["complete_motion", "complete_sensors", "completing", "effect_names"]
 
 
 def completing(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
@@ -40,6 +40,9 @@ def _motion_names() -> list[str]:
 
 
 _motion = completing(_motion_names)
+
+complete_sensors = completing(lambda: shipped("sensors"))
+"""Names of shipped sensors files."""
 
 
 def complete_motion(ctx: typer.Context, incomplete: str) -> list[str]:

@@ -11,7 +11,7 @@ import typer
 from ..core.errors import ParameterError, RecordError, UnknownNameError
 from ..core.files import shipped, shipped_specimens
 from ..core.names import ENGINES, SCHEMES
-from .completion import completing
+from .completion import complete_sensors, completing
 from .results_folder import Out, ResumedOut, folder_for
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ SensorsName = Annotated[
     typer.Option(
         help="Noise and calibration ranges of the sensors: shipped name, or a TOML file; default: those that the "
         "machine file names, else as rests of the records show.",
-        autocompletion=completing(lambda: shipped("sensors")),
+        autocompletion=complete_sensors,
     ),
 ]
 MachineName = Annotated[
@@ -129,7 +129,7 @@ class MachineOptions:
         typer.Option(
             help="Sensors file, or shipped name, that states accelerometers on the platen; the acceleration feedback "
             "is then computed from them. Default: those of the machine file, else the platen's own acceleration.",
-            autocompletion=completing(lambda: shipped("sensors")),
+            autocompletion=complete_sensors,
         ),
     ] = None
 

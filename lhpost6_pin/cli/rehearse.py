@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..core.errors import ParameterError, RecordError, SimulationError
-from ..core.files import shipped
 from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
-from .completion import complete_motion, completing
+from .completion import complete_motion, complete_sensors
 from .live_view import EndedBySignal, LiveOptions, watched
 from .loop_check import TUNING_FILES, checked_loop, interaction_of, loop_entries, loop_facts, retuned
 from .motion_options import MotionOptions
@@ -207,7 +206,7 @@ def campaign(
         typer.Option(
             help="Noise and errors of the sensors: shipped name, or a TOML file; default: those that the machine file "
             "names, else the LHPOST6's.",
-            autocompletion=completing(lambda: shipped("sensors")),
+            autocompletion=complete_sensors,
         ),
     ] = None,
     tests: Annotated[str | None, typer.Option(help="Tests of the campaign, such as TX,WN; default: all.")] = None,

@@ -190,13 +190,11 @@ def _usable(run: Run) -> Run:
     Raises SimulationError with the run's trouble if fewer than two samples, the least of a record, remain.
     """
     arrays = (run.q, run.v, run.a, run.z, run.spool)
-    if all(np.isfinite(x).all() for x in arrays) and len(run.q) > 1:
-        return run
-    finite = np.logical_and.reduce([np.isfinite(x).all(axis=1) for x in arrays])
-    n = len(finite) if finite.all() else int(np.argmin(finite))
+    whole = all(np.isfinite(x).all() for x in arrays)
+    n = len(run.q) if whole else int(np.argmin(np.logical_and.reduce([np.isfinite(x).all(axis=1) for x in arrays])))
     if n < 2:
         raise SimulationError(run.trouble or f"a record needs two samples; this run has {n}")
-    if n == len(finite):
+    if whole:
         return run
     command = None if run.command is None else run.command[:n]
     rows = {name: getattr(run, name)[:n] for name in ("time", "q", "v", "a", "z", "spool")}

@@ -115,11 +115,10 @@ def run_doubts(run: Run, displacement: Array | None = None) -> list[str]:
     displacement (n, 6): that of C and Euler angles in this run, where it is known.
     """
     low, found = float(run.plant.supply[1]), []
-    below = _lowest(run, low)
-    empty = {one.chamber.place: one for one in (_lowest(run, 0.0) if below else ())}
-    for one in below:
-        chamber, at, least = empty.get(one.chamber.place, one)
-        bound = "zero" if least < 0.0 else f"the return pressure of {low / 1e6:.3g} MPa"
+    for chamber, at, least in _lowest(run, low):
+        bound = f"the return pressure of {low / 1e6:.3g} MPa"
+        if least < 0.0:
+            at, bound = _first_below(run, chamber, 0.0), "zero"
         found.append(f"{chamber} fell to {least / 1e6:.3g} MPa, below {bound}, first at {at:.3f} s")
         if 0.0 <= least < chamber.vapour:
             lifts = f", and {chamber.actuator.name}, which cannot pull, hardly bears on the platen" * chamber.bears
@@ -140,9 +139,13 @@ def _lowest(run: Run, level: float) -> list[_Low]:
         least = np.fmin.reduce(run.z, axis=0)
     for chamber in _chambers(run.plant):
         if least[chamber.place] < level:
-            first = int((run.z[:, chamber.place] < level).argmax())
-            found.append(_Low(chamber, float(run.time[first]), float(least[chamber.place])))
+            found.append(_Low(chamber, _first_below(run, chamber, level), float(least[chamber.place])))
     return found
+
+
+def _first_below(run: Run, chamber: _Chamber, level: float) -> float:
+    """Time [s] at which a chamber first fell below a level [Pa]."""
+    return float(run.time[int((run.z[:, chamber.place] < level).argmax())])
 
 
 def _chambers(plant: Plant) -> Iterator[_Chamber]:

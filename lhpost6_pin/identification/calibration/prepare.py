@@ -75,17 +75,21 @@ def prepare_problem(
         sways = driven_wrenches(mounted, moved, test.dt) - driven_wrenches(plant, moved, test.dt)
         return replace(test, carried=sways)
 
-    def drawn(policy: Policy) -> list[MeasuredTest]:
-        return [carrying(prepare_noisier(plant, r, sensors, policy, rng)) for r in records]
+    def noisier(record: xr.Dataset, policy: Policy) -> MeasuredTest:
+        return carrying(prepare_noisier(plant, record, sensors, policy, rng))
 
     tests = [carrying(prepare_test(plant, r, sensors, policy)) for r in records]
-    noisy = [test for _ in range(int(n("fit.draws"))) for test in drawn(policy._replace(shares=False))]
-    # noise that a record does not have adds nothing to the normal equations, so nothing of it is subtracted
-    exact = {i: test for i, (r, test) in enumerate(zip(records, tests, strict=True)) if not is_measured(r)}
-    if exact:
+    rougher = policy._replace(shares=False)
+    noisy = [noisier(record, rougher) for _ in range(int(n("fit.draws"))) for record in records]
+    exact = [not is_measured(record) for record in records]
+    if any(exact):
         free = "simulated without noise; weights and intervals are those of the noise that sensors %s state"
-        log.warning(f"%s: {free}", ", ".join(test.name for test in exact.values()), sensors.name)
-    again = [[exact.get(i, test) for i, test in enumerate(drawn(policy))] for _ in range(int(n("fit.corrections")))]
+        log.warning(f"%s: {free}", ", ".join(t.name for t, one in zip(tests, exact, strict=True) if one), sensors.name)
+    # noise that a record does not have adds nothing to the normal equations, so nothing of it is subtracted
+    again = [
+        [test if one else noisier(r, policy) for r, test, one in zip(records, tests, exact, strict=True)]
+        for _ in range(int(n("fit.corrections")))
+    ]
     problem = Problem(
         *(machine, tests, noisy, sensors, comparison),
         again=again, jobs=jobs, kinds=kinds, others=others(machine), delays=removed,

@@ -7,7 +7,8 @@ import pytest
 from scipy import signal
 
 from lhpost6_pin.control import Notch, load_controller, make_controller
-from lhpost6_pin.control.loop import CANCELLER, GENERATOR, MEMORY_ROWS, Feedback, cancel, control_step
+from lhpost6_pin.control.loop import GENERATOR, MEMORY_ROWS, Feedback, cancel, control_step, step_packed
+from lhpost6_pin.control.tables import CANCELLER, make_scratch
 from lhpost6_pin.core.errors import ControllerError
 from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE
 from lhpost6_pin.data.signals import align, delay, rrmse
@@ -169,7 +170,8 @@ def call(function, plant, loop, sample, drive, displacement, acceleration, force
             type(bundle)(*(t.view(np.recarray) if isinstance(t, np.ndarray) and t.dtype.names else t for t in bundle))
             for bundle in (tables, control)
         )
-    return function(sample, drive, Feedback(displacement, acceleration, force), tables, control, memory, command)
+    sensors, scratch = Feedback(displacement, acceleration, force), make_scratch(plant)
+    return function(sample, drive, sensors, tables, control, memory, scratch, command)
 
 
 def signals(plant, rest, seed=4):
@@ -242,6 +244,19 @@ def test_each_term_of_the_law_acts_as_its_formula_says(plant, rest, term):
     assert np.abs(wanted).max() > 1e-6  # the term acts
     # the Jacobian is that of the sample before; the platen moves by 2e-7 m and turns by 4e-8 rad a sample
     assert np.all(np.abs(found - wanted).max(axis=0) < 1e-5 * np.abs(wanted).max(axis=0))
+
+
+def test_the_step_with_packed_tables_is_that_with_tables(plant, controller, rest):
+    """The same code on the same numbers: bit by bit."""
+    pose, acceleration, drive, force = (x[:12] for x in signals(plant, rest))
+    memory, scratch = controller.init(), make_scratch(plant).packed
+    other, found, wanted = controller.init(), np.empty(plant.spools), np.empty(plant.spools)
+    for n in range(12):
+        legs = legs_at(plant, pose[n])
+        call(control_step, plant, controller, n, drive, legs, acceleration[n], force[n], other, wanted)
+        packed = plant.tables.packed, controller.tables.packed
+        step_packed(n, drive, legs, acceleration[n], force[n], *packed, memory, scratch, found)
+        assert np.array_equal(found, wanted) and np.array_equal(memory, other)
 
 
 def test_the_compiled_step_is_its_original_in_python(plant, rest):

@@ -260,7 +260,7 @@ def test_a_measured_motion_beyond_the_stroke_is_evaluated_and_one_beyond_the_cha
     still = np.zeros((4, 6))
     path = ports_along(plant, plant_motion(plant, PlatenMotion(displacement, still, still)))
     assert path.s[2, 4:10] == pytest.approx(np.full(6, 0.1285))
-    (first, *_) = ends = stroke_ends(plant, np.arange(4) / 512, displacement)
+    (first, *_) = ends = stroke_ends(plant, np.arange(4) / 512, path.s[:, : plant.spools])
     assert len(ends) == 6 and first.actuator == "V1" and first.time == 2 / 512
 
 

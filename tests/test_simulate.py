@@ -11,7 +11,7 @@ from page_cases import Reader
 from run_cases import closed_loop, sine_motion
 
 from lhpost6_pin.control import load_controller, make_controller
-from lhpost6_pin.control.loop import CANCELLER
+from lhpost6_pin.control.tables import CANCELLER
 from lhpost6_pin.core.errors import SimulationError, UnknownNameError
 from lhpost6_pin.core.names import ENGINES, SAMPLE_RATE, SCHEMES
 from lhpost6_pin.data.records import load_record

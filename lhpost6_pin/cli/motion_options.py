@@ -165,8 +165,6 @@ class MotionOptions:
 
     def _ground(self) -> "GroundMotion":
         """Motion by name, from one file or three component files, or by name from such files."""
-        from ..data.motion_files import motion_of
-
         options: dict[str, Any] = {}
         for item in self.set_ or []:
             key, equals, value = item.partition("=")
@@ -185,6 +183,12 @@ class MotionOptions:
                 "--rotate-by turns any motion by an angle"
             )
         name = None if is_file(first) else first
+        if name and not files:
+            from ..motions import find_motion
+
+            return find_motion(name, **options)
+        from ..data.motion_files import motion_of
+
         return motion_of(name, files if name else self.motion, **options, **about_file)
 
 

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..core.beside import beside, import_all
 from ..core.errors import ParameterError, RecordError, SimulationError
-from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
+from ..core.names import SAMPLE_RATE, SCHEMES
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
 from .completion import complete_motion, complete_sensors
@@ -32,6 +33,9 @@ log = logging.getLogger(__name__)
 
 TEST_FACTS = ("machine", "motion", "scale", "time_scale", "specimen", "effects", "overrides")
 """Attributes of a record that say what was run on what, for `--json`."""
+
+_AFTER_A_RUN = ("xarray", "lhpost6_pin.data.netcdf", "lhpost6_pin.show.run_results", "lhpost6_pin.show.tables")
+"""What record and report need: loaded while the table is simulated."""
 
 __all__ = ["campaign", "motions", "open_loop", "run", "save_run"]
 
@@ -67,7 +71,7 @@ def run(
     """
     from ..control import ControllerSettings
     from ..control.inverse import load_inverse
-    from ..simulation.compile_ahead import compile_ahead, wait_for
+    from ..simulation.compile_ahead import compile_ahead, load_ahead, wait_for
     from ..simulation.rehearse import rehearse
 
     if record_rate < 1 or SAMPLE_RATE % record_rate:
@@ -76,8 +80,8 @@ def run(
     chosen = opt.find_controller(controller, table)
     own = not isinstance(chosen, ControllerSettings)
     options = steps.checked(table, own_controller=own)
-    usual = (steps.engine, steps.scheme) == (ENGINES[0], SCHEMES[0]) and not own and options["coupling"] is None
-    compiling = compile_ahead() if usual else None
+    usual = steps.scheme == SCHEMES[0] and not own and options["coupling"] is None
+    compiling = compile_ahead(steps.engine) if usual else None
     inverse = load_inverse(aic) if aic else None
     if inverse is not None:
         if not isinstance(chosen, ControllerSettings):
@@ -86,6 +90,8 @@ def run(
 
         check_circumstances(str(aic), inverse.made_with, table, chosen.name)
     target = motion.target(table, beyond)
+    if usual:
+        load_ahead(steps.engine)
     name = target.reference.motion.replace("/", "_")
     asked = (("record.nc", no_record), ("report.html", no_report), ("tuning.html", no_report))
     leave_out = {file for file, no in asked if no}
@@ -100,6 +106,7 @@ def run(
     loop = checked_loop(table, chosen, machine, retune=not retune)
     title = f"{target.reference.title} on {table.name}"
     wait_for(compiling)
+    beside(import_all, *_AFTER_A_RUN)
     ended = EndedBySignal(view.live)
     with (
         watched(view, table, title, err=json, ended=ended) as watch,

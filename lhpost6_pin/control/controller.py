@@ -17,22 +17,10 @@ from ..mechanics.plant import Plant, make_plant
 from ..mechanics.pose import kinematic_jacobian
 from ..mechanics.rigid_body import platen_inertia
 from .filters import drive_for, feedback_generator, notch_section, reference_generator
-from .loop import (
-    ACTUATOR,
-    AXIS,
-    CANCELLER,
-    FEEDBACK,
-    FORCE,
-    GENERATOR,
-    MEMORY_ROWS,
-    POSE,
-    ControlTables,
-    Feedback,
-    control_step,
-    pack_control,
-)
+from .loop import FEEDBACK, FORCE, GENERATOR, MEMORY_ROWS, POSE, Feedback, control_step
 from .plug import Wanted
 from .settings import ControllerSettings
+from .tables import ACTUATOR, AXIS, CANCELLER, ControlTables, make_scratch, pack_control
 
 __all__ = ["Controller", "controlled", "make_controller"]
 
@@ -42,10 +30,10 @@ class Controller(NamedTuple):
 
     settings: ControllerSettings
     plant: Plant
-    axis: NDArray[np.void]  # loop.AXIS, one row a free axis
-    actuator: NDArray[np.void]  # loop.ACTUATOR
+    axis: NDArray[np.void]  # tables.AXIS, one row a free axis
+    actuator: NDArray[np.void]  # tables.ACTUATOR
     balance: Array  # (n_actuators, n_actuators) leg rate [m/s] per force [N] in the null space of the motion
-    canceller: NDArray[np.void]  # loop.CANCELLER, empty but in sine tests
+    canceller: NDArray[np.void]  # tables.CANCELLER, empty but in sine tests
     jacobian: Array  # (n_actuators, 6) leg rates per motion of C and Euler angles, zero-position
     lever: Array  # (6, 6) motion of C and Euler angles per twist at B, zero-position
 
@@ -92,7 +80,8 @@ class Controller(NamedTuple):
         if not 0 <= sample < len(drive):
             raise ControllerError(f"{self.settings.name}: sample {sample} of a drive with {len(drive)} samples")
         command = np.empty(n)
-        control_step(sample, drive, Feedback(*sensors), self.plant.tables, self.tables, memory, command)
+        scratch = make_scratch(self.plant)
+        control_step(sample, drive, Feedback(*sensors), self.plant.tables, self.tables, memory, scratch, command)
         return command
 
     def _check(self, name: str, values: Array, shape: tuple[int, ...]) -> None:

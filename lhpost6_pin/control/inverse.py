@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.arrays import Array
@@ -144,6 +143,8 @@ def apply_inverse(inverse: InverseFilter, signal: ArrayLike) -> Array:
 # ---------------------------------------------------------------------------------------------- disk
 def save_inverse(inverse: InverseFilter, path: Path | str) -> None:
     """Write an inverse as netCDF-4, whole or not at all."""
+    import xarray as xr
+
     data = xr.Dataset(
         {"inverse_taps": (("tap", "drive_axis", "reference_axis"), inverse.taps)},
         {"drive_axis": list(inverse.axes), "reference_axis": list(inverse.axes)},

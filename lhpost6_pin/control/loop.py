@@ -20,12 +20,10 @@ For sine tests a canceller adds harmonics to the drive before the reference gene
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..core.compiled import INTEGER, MATRIX, VECTOR, compiled, compiled_inline, compiled_source
 from ..core.names import SAMPLE_RATE
-from ..core.packed import array_view, table_view
 from ..laws.orifice import spool_for_opening
 from ..mechanics.accelerometers import composed_acceleration
 from ..mechanics.pose import gauss_newton_step, leg_jacobian, pose_acceleration
@@ -34,71 +32,10 @@ from ..mechanics.tables import unpack_tables
 from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import unpack_workspace
 from .filters import NOTCHES
+from .tables import unpack_control, unpack_scratch
 
-__all__ = ["ACTUATOR", "AXIS", "CANCELLER", "CONTROL_TYPES", "FEEDBACK", "FORCE", "GENERATOR", "MEMORY_ROWS", "POSE"]
-__all__ += ["ControlTables", "Feedback", "control_packed", "control_sample", "control_step", "pack_control", "sense"]
-__all__ += ["sense_packed", "step_packed"]
-
-AXIS = np.dtype(
-    [
-        ("displacement_feedforward", np.float64),  # Kxf [1/s]
-        ("velocity_feedforward", np.float64),  # Kvf [1]
-        ("acceleration_feedforward", np.float64),  # Kaf [s]
-        ("jerk_feedforward", np.float64),  # Kjf [s2]
-        ("displacement_gain", np.float64),  # Kx [1/s]
-        ("velocity_gain", np.float64),  # Kv [1]
-        ("acceleration_gain", np.float64),  # Ka [s]
-        ("reset_gain", np.float64),  # Ki per sample [1/s]
-        ("reset_limit", np.float64),  # [m/s, rad/s]
-        ("force_gain", np.float64),  # KF [m/s/N, rad/s/(N m)]
-        ("high_pass", np.float64),  # pole of the force high-pass per sample
-        ("master_gain", np.float64),  # Km [1]
-        ("generator_a", np.float64, (4, 4)),  # reference generator: x+ = a x + b u, (xr vr ar jr) = c x + d u
-        ("generator_b", np.float64, 4),
-        ("generator_c", np.float64, (4, 4)),
-        ("generator_d", np.float64, 4),
-        ("feedback_a", np.float64, (3, 3)),  # feedback generator: inputs xs, as; outputs xf, vf, af
-        ("feedback_b", np.float64, (3, 2)),
-        ("feedback_c", np.float64, (3, 3)),
-        ("feedback_d", np.float64, (3, 2)),
-        ("notch", np.float64, (NOTCHES, 5)),  # b0 b1 b2 a1 a2 of each second-order section
-        ("notches", np.float64),  # number of active sections
-    ]
-)
-"""Table row of a free axis."""
-
-ACTUATOR = np.dtype(
-    [
-        ("extend", np.float64),  # unloaded speed at full opening [m/s]
-        ("retract", np.float64),
-        ("flow_curve", np.float64),  # lambda [1]
-        ("bias", np.float64),  # opening at rest [1]
-        ("force", np.float64),  # force at rest [N]
-        ("limit", np.float64),  # largest spool command [1]
-    ]
-)
-"""Table row of an actuator."""
-
-CANCELLER = np.dtype(
-    [
-        ("axis", np.float64),  # index among the free axes
-        ("turn", np.float64),  # phase per sample [rad]
-        ("cosine", np.float64),  # of the phase of the path from drive to feedback at this frequency
-        ("sine", np.float64),
-        ("rate", np.float64),  # adaptation per sample over the gain of that path
-    ]
-)
-"""Table row of a sine canceller: one harmonic of one axis."""
-
-
-class ControlTables(NamedTuple):
-    """Tables of a controller; treat the arrays as read only."""
-
-    packed: Array  # all the following, concatenated
-    axis: NDArray[np.void]  # AXIS, one row per free axis
-    actuator: NDArray[np.void]  # ACTUATOR
-    balance: Array  # (n_actuators, n_actuators) leg rate [m/s] per force [N] in the null space of the motion
-    canceller: NDArray[np.void]  # CANCELLER, empty but in sine tests
+__all__ = ["CONTROL_TYPES", "FEEDBACK", "FORCE", "GENERATOR", "MEMORY_ROWS", "POSE", "Feedback", "cancel"]
+__all__ += ["control_packed", "control_sample", "control_step", "sense", "sense_packed", "step_packed"]
 
 
 class Feedback(NamedTuple):
@@ -107,35 +44,6 @@ class Feedback(NamedTuple):
     displacement: Array  # (n_actuators,) from the zero-position [m]
     acceleration: Array  # (6,) of C in {s} and Euler angles, as accelerometers give it if there are any [m/s2, rad/s2]
     force: Array  # (n_actuators,) [N]
-
-
-def pack_control(
-    axis: NDArray[np.void], actuator: NDArray[np.void], balance: Array, canceller: NDArray[np.void]
-) -> ControlTables:
-    """Tables of a controller, also packed into one array."""
-    parts = [np.ascontiguousarray(x) for x in (axis, actuator, balance, canceller)]
-    sizes = np.array([len(axis), len(actuator), len(canceller)], float)
-    packed = np.concatenate([sizes, *(x.view(float).ravel() for x in parts)])
-    return ControlTables._make([packed, *parts])
-
-
-_AXIS_SIZE, _ACTUATOR_SIZE, _CANCELLER_SIZE = (d.itemsize // 8 for d in (AXIS, ACTUATOR, CANCELLER))
-
-
-@compiled_inline
-def unpack_control(packed):
-    """Tables of a controller from `ControlTables.packed`, which the caller holds."""
-    axes, n, cancellers = int(packed[0]), int(packed[1]), int(packed[2])
-    actuator = 3 + _AXIS_SIZE * axes
-    balance = actuator + _ACTUATOR_SIZE * n
-    canceller = balance + n * n
-    return ControlTables(
-        array_view(packed, 0, (packed.size,)),
-        table_view(packed, AXIS, 3, actuator),
-        table_view(packed, ACTUATOR, actuator, balance),
-        array_view(packed, balance, (n, n)),
-        table_view(packed, CANCELLER, canceller, canceller + _CANCELLER_SIZE * cancellers),
-    )
 
 
 POSE, RESET, FORCE, HIGH_PASSED, CLIPPED = range(5)
@@ -207,33 +115,24 @@ def cancel(canceller, sample, a, error, level, weights):
 
 
 @compiled_source
-def control_step(sample, drive, feedback, tables, control, memory, command):
+def control_step(sample, drive, feedback, tables, control, memory, scratch, command):
     """Fill command (n_actuators,) of one sample; memory is the controller's state, changed in place.
 
     drive (n, 6 or 13): input of the reference generators, in the quantity of their mode; for cancellers columns 6 to 11
     hold the wanted acceleration and column 12 their level, 0 to 1. Cancellers do not learn while commands are clipped.
-    feedback (`Feedback`), tables of the plant, control of the controller (`ControlTables`). Commands beyond their limit
-    are clipped to it; returns their number.
+    feedback (`Feedback`), tables of the plant, control of the controller (`ControlTables`), `Scratch`. Commands beyond
+    their limit are clipped to it; returns their number.
     """
     legs, body, axes = tables.legs, tables.body, tables.axes
     axis, actuator, balance, canceller = control.axis, control.actuator, control.balance, control.canceller
     displacement, acceleration, force = feedback.displacement, feedback.acceleration, feedback.force
+    K, reference, measured, rate = scratch.K, scratch.reference, scratch.measured, scratch.rate
     n = command.size
-    ports = legs.size
-    for i in range(legs.size):
-        if legs[i].pad >= 0:
-            ports = max(ports, legs[i].pad + 2)
     pose = memory[POSE]
-    s = np.empty(ports)
-    J = np.empty((ports, 6))
-    B = np.empty((ports, 6))
-    K = np.empty((legs.size, 6))
-    frame = np.empty((8, 3))
-    reference = np.empty(4)
-    measured = np.empty(3)
-    leg_jacobian(pose, legs, body, s, J, B, frame, K)
-    gauss_newton_step(displacement, s, K, axes, pose)
-    rate = np.zeros(n)
+    leg_jacobian(pose, legs, body, scratch.port, scratch.J, scratch.B, scratch.frame, K)
+    gauss_newton_step(displacement, scratch.port, K, axes, pose)
+    for i in range(n):
+        rate[i] = 0.0
     for a in range(axes.size):
         k = axes[a]
         row = axis[a]
@@ -304,16 +203,15 @@ def sense(tables, ws, feedback):
 
 
 @compiled_source
-def control_sample(sample, drive, tables, ws, control, memory, command, window):
+def control_sample(sample, drive, tables, ws, control, memory, scratch, command, window):
     """One controller sample of a run: sensors, command, and the delayed spools of its model steps.
 
     Fills row `sample` of command (n, n_actuators) and window (n_steps, n_actuators). Returns the number of commands
     clipped.
     """
-    n = tables.actuators.size
-    feedback = Feedback(np.empty(n), np.empty(6), np.empty(n))
+    feedback = Feedback(scratch.displacement, scratch.acceleration, scratch.force)
     sense(tables, ws, feedback)
-    clipped = control_step(sample, drive, feedback, tables, control, memory, command[sample])
+    clipped = control_step(sample, drive, feedback, tables, control, memory, scratch, command[sample])
     delayed_spools(command, 0, sample, tables.delays, float(SAMPLE_RATE), window)
     return clipped
 
@@ -322,21 +220,21 @@ def control_sample(sample, drive, tables, ws, control, memory, command, window):
 
 
 @compiled
-def control_packed(sample, drive, tables, buffer, control, memory, command, window):
-    """`control_sample` with its tables and workspace packed."""
-    plant, ws = unpack_tables(tables), unpack_workspace(buffer)
-    return control_sample(sample, drive, plant, ws, unpack_control(control), memory, command, window)
+def control_packed(sample, drive, tables, buffer, control, memory, scratch, command, window):
+    """`control_sample` with its tables, workspace and scratch packed."""
+    plant, ws, own = unpack_tables(tables), unpack_workspace(buffer), unpack_scratch(scratch)
+    return control_sample(sample, drive, plant, ws, unpack_control(control), memory, own, command, window)
 
 
-CONTROL_TYPES = INTEGER, MATRIX, VECTOR, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX
+CONTROL_TYPES = INTEGER, MATRIX, VECTOR, VECTOR, VECTOR, MATRIX, VECTOR, MATRIX, MATRIX
 """Types of the arguments of `control_packed`."""
 
 
 @compiled
-def step_packed(sample, drive, displacement, acceleration, force, tables, control, memory, command):
-    """`control_step` with its sensors as arrays and its tables packed."""
-    sensors, plant = Feedback(displacement, acceleration, force), unpack_tables(tables)
-    return control_step(sample, drive, sensors, plant, unpack_control(control), memory, command)
+def step_packed(sample, drive, displacement, acceleration, force, tables, control, memory, scratch, command):
+    """`control_step` with its sensors as arrays, its tables and scratch packed."""
+    sensors, plant, own = Feedback(displacement, acceleration, force), unpack_tables(tables), unpack_scratch(scratch)
+    return control_step(sample, drive, sensors, plant, unpack_control(control), memory, own, command)
 
 
 @compiled

@@ -24,12 +24,14 @@ import numba
 
 from .files import refuse_folder
 
-__all__ = ["INTEGER", "MATRIX", "SCALAR", "VECTOR"]
+__all__ = ["BOOLEAN", "INTEGER", "MATRIX", "SCALAR", "VECTOR"]
 __all__ += ["cache_folder", "compiled", "compiled_inline", "compiled_source", "copy_scaled", "entry_point"]
+__all__ += ["tuple_type"]
 
 log = logging.getLogger(__name__)
 
-INTEGER, SCALAR, VECTOR, MATRIX = numba.int64, numba.float64, numba.float64[::1], numba.float64[:, ::1]
+BOOLEAN, INTEGER, SCALAR = numba.boolean, numba.int64, numba.float64
+VECTOR, MATRIX = SCALAR[::1], SCALAR[:, ::1]
 """Types of arguments, for `entry_point`: arrays are contiguous, in C order."""
 
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -118,6 +120,11 @@ def compiled_source(function: _F) -> _F:
     As such it is compiled once; a part called, or inlined by `compiled_inline`, is compiled for itself as well.
     """
     return _jit(function, inline="always")
+
+
+def tuple_type(kind: type[tuple[Any, ...]], *fields: Any) -> Any:
+    """Type of a NamedTuple whose fields are of these types, as an argument."""
+    return numba.types.NamedTuple(fields, kind)
 
 
 def entry_point(function: Callable[..., Any], types: tuple[Any, ...]) -> Callable[..., Any]:

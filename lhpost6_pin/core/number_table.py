@@ -3,7 +3,6 @@
 import csv
 import re
 from collections.abc import Sequence
-from io import StringIO
 from typing import NamedTuple
 
 import numpy as np
@@ -86,28 +85,11 @@ def read_rows(
 
     Raises `error` naming line and column, with the remedy for decimal `commas` or how to `correct` any other field.
     """
-    import pandas as pd
-
     for k, line in lines:
         if (count := dialect.count(line)) != len(names):
             remedy = commas if split_at_commas(line, dialect, len(names)) else "correct it, or cut the table there"
             raise error(f"{where}, line {k}: {count} fields, the header has {len(names)}; {remedy}")
-    try:
-        values = pd.read_csv(
-            StringIO("\n".join(line.strip(" \r\n") for _, line in lines)),
-            sep=r"\s+" if dialect.separator == " " else dialect.separator,
-            decimal=dialect.decimal,
-            header=None,
-            names=range(len(names)),
-            index_col=False,
-            skipinitialspace=True,
-            skip_blank_lines=False,
-            float_precision="round_trip",
-            na_values=[hole for hole in HOLES if hole] + ["NAN", "NaN", "NA"],
-            dtype=float,
-        ).to_numpy(float)
-    except Exception:  # pandas raises its own, value and overflow errors for what is no number
-        values = np.empty((0, 0))
+    values = _numbers(lines, len(names), dialect, holes)
     if len(values) == len(lines) and (holes or np.isfinite(values).all()):
         return values
 
@@ -123,3 +105,31 @@ def read_rows(
 
     fields = ((k, zip(dialect.split(line), names, strict=True)) for k, line in lines)
     return np.array([[value(x, f"{where}, line {k}, column {name!r}") for x, name in row] for k, row in fields], float)
+
+
+def _numbers(lines: Sequence[tuple[int, str]], columns: int, dialect: Dialect, holes: bool) -> Array:
+    """Numbers (n, columns) of lines, with `holes` NaN for missing samples; (0, columns) if a field is no number."""
+    bare = [line.strip(" \r\n") for _, line in lines]
+    if dialect.decimal == ",":
+        bare = [line.replace(",", ".") for line in bare]
+    separator = None if dialect.separator == " " else dialect.separator
+    for missing in (None, _missing(dialect)) if holes else (None,):
+        rows = bare if missing is None else [missing.sub("nan", row) for row in bare]
+        if not any(rows):  # loadtxt warns of nothing to read
+            continue
+        try:
+            values = np.loadtxt(rows, delimiter=separator, comments=None, quotechar='"', ndmin=2)
+        except ValueError:
+            continue
+        if values.shape == (len(lines), columns):  # empty lines are passed over
+            return np.asarray(values)
+    return np.empty((0, columns))
+
+
+def _missing(dialect: Dialect) -> re.Pattern[str]:
+    """Pattern of a field, with the quotes around it, that is a missing sample."""
+    words = "|".join(sorted(map(re.escape, HOLES), key=len, reverse=True))  # the empty one last
+    if dialect.separator == " ":
+        return re.compile(rf"(?<!\S)(?:{words.removesuffix('|')})(?!\S)", re.IGNORECASE)
+    mark = re.escape(dialect.separator)
+    return re.compile(rf'(?:^|(?<={mark})) *"?(?:{words})"? *(?={mark}|$)', re.IGNORECASE)

@@ -6,10 +6,9 @@ controller's constant weights mistake for acceleration (`mechanics.accelerometer
 the result is that of the accelerometers times the weights.
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ..core.arrays import Array
 from ..core.compiled import compiled
@@ -22,6 +21,9 @@ from ..mechanics.spatial import from_body, rpy_acceleration, turning, turning_ra
 from .channels import LAYOUT
 from .records import sample_interval
 from .signals import Band, differentiate
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["WEIGHTS", "acceleration_of_signals", "accelerometer_channel", "accelerometer_signals"]
 __all__ += ["rows_of", "with_platen_acceleration"]
@@ -64,7 +66,7 @@ def accelerometer_channel(rows: Array, signals: Array) -> tuple[tuple[str, ...],
     return channel.dims, signals, {**about, "points": rows[:, :3].ravel(), "directions": rows[:, 3:].ravel()}
 
 
-def rows_of(record: xr.Dataset) -> Array:
+def rows_of(record: "xr.Dataset") -> Array:
     """Rows (n_accelerometers, 6) of a record's accelerometers: point from C [m] and unit direction, in platen axes.
 
     Raises RecordError if their attributes do not state them.
@@ -82,7 +84,7 @@ def rows_of(record: xr.Dataset) -> Array:
     return np.hstack(parts)
 
 
-def with_platen_acceleration(plant: Plant, record: xr.Dataset) -> xr.Dataset:
+def with_platen_acceleration(plant: Plant, record: "xr.Dataset") -> "xr.Dataset":
     """The record with `platen_acceleration` computed from its `point_acceleration`, in place of any that it has.
 
     Where neither platen displacement nor actuator lengths were measured, the platen is taken to be level and not to

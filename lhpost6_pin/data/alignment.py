@@ -11,10 +11,9 @@ joins spools and pressures is flow; spools follow their commands by the valves' 
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.arrays import Array
@@ -25,6 +24,9 @@ from ..mechanics.pose import leg_displacements
 from .channels import LAYOUT, sensor_groups
 from .records import sample_interval
 from .signals import Band, align, differentiate, lag
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = [
     "Delay",
@@ -163,7 +165,9 @@ def combine_delays(delay: ArrayLike, error: ArrayLike) -> tuple[float, float]:
     return mean, float(max(scatter, 1.0) / np.sqrt(weight.sum()))
 
 
-def group_delays(plant: Plant, records: Sequence[xr.Dataset], only: Collection[str] | None = None) -> dict[str, Delay]:
+def group_delays(
+    plant: Plant, records: "Sequence[xr.Dataset]", only: Collection[str] | None = None
+) -> dict[str, Delay]:
     """Delay of every group of `channels.sensor_groups` with redundant channels, or of `only` some, over all records.
 
     Motion and struts are counted from `platen_displacement`, chamber pressures from `actuator_force`. A group that is
@@ -186,7 +190,7 @@ def group_delays(plant: Plant, records: Sequence[xr.Dataset], only: Collection[s
     return result
 
 
-def align_record(record: xr.Dataset, delays: Mapping[str, Delay | float]) -> xr.Dataset:
+def align_record(record: "xr.Dataset", delays: Mapping[str, Delay | float]) -> "xr.Dataset":
     """Record whose groups are advanced by their delays [s]; its attribute `aligned` lists them."""
     if not delays:
         return record
@@ -210,7 +214,7 @@ def due_spools(plant: Plant, command: Array, dt: float) -> Array:
     return lag(late, plant.lags, dt) if plant.lags.any() else late
 
 
-def hydraulic_force(machine: Machine, record: xr.Dataset) -> Array:
+def hydraulic_force(machine: Machine, record: "xr.Dataset") -> Array:
     """P_A A_1 - P_B A_2 (n, actuators) of the measured chamber pressures [N]; NaN where one is missing."""
     a = record["chamber_pressure_a"].reindex(actuator=list(machine.actuator_names)).values
     b = np.full((len(a), len(machine.double_acting)), np.nan)
@@ -228,7 +232,7 @@ def oil_force(machine: Machine, pressure_a: Array, pressure_b: Array | None = No
     return np.asarray(force, np.float64)
 
 
-def _pairs(plant: Plant, record: xr.Dataset, dt: float) -> Iterator[tuple[str, str, Array, Array]]:
+def _pairs(plant: Plant, record: "xr.Dataset", dt: float) -> Iterator[tuple[str, str, Array, Array]]:
     """Group, its reference, measured signals (n, k) and the signals they follow (n, k)."""
     count = plant.spools
     for name, channel in LAYOUT.items():

@@ -7,13 +7,14 @@ import, checks, simulated campaigns, alignment, cross-checks and the sensor erro
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any, Literal
 
 from ..core.arrays import Array
 from ..core.names import AXES
 from ..core.units import parse_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = [
     "LAYOUT",
@@ -212,17 +213,17 @@ def residuals_of(name: str, present: Collection[str]) -> tuple[str, ...]:
     return (*("wrench",) * stands_in, *channel.residuals, *("flow",) * alone)
 
 
-def columns_of(variable: xr.DataArray) -> Array:
+def columns_of(variable: "xr.DataArray") -> Array:
     """Values (n, columns) of a variable along time."""
     return variable.values.astype(float).reshape(len(variable), -1)
 
 
-def kinds_of(variable: xr.DataArray) -> tuple[slice, ...]:
+def kinds_of(variable: "xr.DataArray") -> tuple[slice, ...]:
     """Columns of a variable that share a unit, and so a recorder's range: translations and rotations, or all."""
     return (slice(0, 3), slice(3, 6)) if "axis" in variable.dims else (slice(None),)
 
 
-def channel_name(variable: xr.DataArray, column: int) -> str:
+def channel_name(variable: "xr.DataArray", column: int) -> str:
     """Name of one column of a variable, as in `platen_displacement[yaw]`."""
     if variable.ndim < 2:
         return str(variable.name)
@@ -240,7 +241,7 @@ def channel_unit(channel: str, units: str | None = None) -> str:
     return parts[-1 if label in AXES[3:] else 0].strip()
 
 
-def column_units(variable: xr.DataArray) -> list[str]:
+def column_units(variable: "xr.DataArray") -> list[str]:
     """Unit of every column of a variable along time: its own `column_units`, or by its `units` and the axis."""
     if own := variable.attrs.get("column_units"):
         return [unit.strip() for unit in str(own).split(",")]

@@ -3,15 +3,17 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from ..core.names import AXES
 from ..machine.parameters import LARGEST, unusable
 from .channels import LAYOUT, LAYOUT_VERSION, Channel, channel_name, columns_of, same_unit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["FASTEST", "SLOWEST", "STEP_TOLERANCE", "RecordFinding", "is_number", "layout_faults", "sampling_rate"]
 
@@ -42,7 +44,7 @@ class RecordFinding:
 _Fault = tuple[str, int | None, str, str]  # channel, sample, message, remedy
 
 
-def layout_faults(dataset: xr.Dataset, labels: Mapping[str, Sequence[str]] | None = None) -> list[RecordFinding]:
+def layout_faults(dataset: "xr.Dataset", labels: Mapping[str, Sequence[str]] | None = None) -> list[RecordFinding]:
     """All violations of the layout by a dataset; empty for a valid record."""
     faults = chain(
         _time_faults(dataset),
@@ -53,7 +55,7 @@ def layout_faults(dataset: xr.Dataset, labels: Mapping[str, Sequence[str]] | Non
     return [RecordFinding("error", *fault) for fault in faults]
 
 
-def _time_faults(dataset: xr.Dataset) -> Iterator[_Fault]:
+def _time_faults(dataset: "xr.Dataset") -> Iterator[_Fault]:
     if "time" not in dataset.variables:
         yield "time", None, "is missing", "add a uniform time coordinate in seconds"
         return
@@ -91,7 +93,7 @@ def sampling_rate(time: NDArray[np.float64]) -> float:
         return float((len(time) - 1) / (time[-1] - time[0]))
 
 
-def _label_faults(dataset: xr.Dataset, wanted: Mapping[str, Sequence[str]]) -> Iterator[_Fault]:
+def _label_faults(dataset: "xr.Dataset", wanted: Mapping[str, Sequence[str]]) -> Iterator[_Fault]:
     have: dict[str, list[str]] = {}
     for dim in ("axis", "actuator", "horizontal", "strut", "floor"):
         if dim in dataset.coords:
@@ -115,7 +117,7 @@ def _label_faults(dataset: xr.Dataset, wanted: Mapping[str, Sequence[str]]) -> I
         yield "horizontal", None, f"has labels {' '.join(some)}", f"take them in order from {' '.join(every)}"
 
 
-def _channel_faults(variable: xr.DataArray, channel: Channel) -> Iterator[_Fault]:
+def _channel_faults(variable: "xr.DataArray", channel: Channel) -> Iterator[_Fault]:
     name = str(variable.name)
     if variable.dims != channel.dims:
         yield name, None, f"has dimensions {variable.dims}", f"they must be {channel.dims}"
@@ -139,7 +141,7 @@ def _channel_faults(variable: xr.DataArray, channel: Channel) -> Iterator[_Fault
         yield channel_name(variable, int(column)), sample, what, "fill the gap or cut the record there"
 
 
-def _attribute_faults(dataset: xr.Dataset) -> Iterator[_Fault]:
+def _attribute_faults(dataset: "xr.Dataset") -> Iterator[_Fault]:
     for key in ("kind", "test", "title", "specimen", "machine", "scheme", "controller", "motion", "drive"):
         if not isinstance(text := dataset.attrs.get(key, ""), str) or "\0" in text:
             yield "", None, f"attribute {key} is {text!r}", "it must be a text"

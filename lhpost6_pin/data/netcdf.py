@@ -16,14 +16,17 @@ import xarray as xr
 __all__ = ["netcdf_content"]
 
 
-def netcdf_content(dataset: xr.Dataset) -> memoryview:
+def netcdf_content(dataset: xr.Dataset, *, single: bool = False) -> memoryview:
     """Content of a netCDF-4 file of a dataset without encoding, uncompressed, no fill values; as `xarray` writes it.
 
+    Where `single`, variables in float64 are written in float32, but for coordinates.
     Raises TypeError or ValueError for variables or attributes that netCDF does not hold.
     """
+    short = {name for name, variable in dataset.data_vars.items() if single and variable.dtype == float}
     plain = all(_is_plain(variable) for variable in dataset.variables.values())
     if not plain or set(dataset.coords) - set(dataset.dims):
-        encoding = {name: {"_FillValue": None} for name in dataset.data_vars}
+        none: dict[str, Any] = {"_FillValue": None}
+        encoding = {name: none | ({"dtype": "f4"} if name in short else {}) for name in dataset.data_vars}
         return dataset.to_netcdf(engine="h5netcdf", encoding=encoding)
     content = io.BytesIO()
     with h5netcdf.File(content, "w") as file:
@@ -32,7 +35,7 @@ def netcdf_content(dataset: xr.Dataset) -> memoryview:
         for name, variable in dataset.variables.items():
             text = variable.dtype.kind in "OU"
             values = variable.values.astype(object) if text else variable.values
-            kind = h5py.string_dtype() if text else variable.dtype
+            kind = h5py.string_dtype() if text else np.dtype("f4") if name in short else variable.dtype
             made = file.create_variable(str(name), variable.dims, kind, data=values)
             made.attrs.update(variable.attrs)
     return content.getbuffer()

@@ -10,10 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
-import pandas as pd
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from ..core.errors import RecordError, UnknownNameError
@@ -21,9 +18,10 @@ from ..core.files import write_whole
 from ..core.names import AXES
 from .channels import LAYOUT, LAYOUT_VERSION
 from .layout_faults import RecordFinding, is_number, layout_faults, sampling_rate
-from .netcdf import netcdf_content
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from ..machine.machine import Machine
 
 __all__ = [
@@ -41,7 +39,7 @@ __all__ = [
     "thinned",
 ]
 
-STEPS: Mapping[int, Callable[[xr.Dataset], xr.Dataset]] = {}
+STEPS: "Mapping[int, Callable[[xr.Dataset], xr.Dataset]]" = {}
 """From each older version of the layout to the next: what is done to a record of it when it is read."""
 
 DEFLATE_LIMIT = 5000  # no compressed netCDF unpacks to more than this (deflate 1032:1, times int16 to float64)
@@ -54,11 +52,14 @@ FULL_SCALE = "full_scale_force"
 """Attribute of a record: force [N] at which an arrow of the viewer has its full length."""
 
 
-def open_record(path: Path | str) -> xr.Dataset:
+def open_record(path: Path | str) -> "xr.Dataset":
     """Read a whole netCDF-4 file into memory without checking its content; an older layout is migrated.
 
     The file stays as it is. Raises `RecordError`, naming the file, if it is missing, not netCDF-4, or damaged.
     """
+    import h5py
+    import xarray as xr
+
     path = Path(path)
     _refuse_no_record(path)
     try:
@@ -92,7 +93,7 @@ def _refuse_no_record(path: Path) -> None:
             raise RecordError(f"{path}: not a netCDF-4 (HDF5) file; {imported}")
 
 
-def _brought_up(dataset: xr.Dataset) -> xr.Dataset:
+def _brought_up(dataset: "xr.Dataset") -> "xr.Dataset":
     """A record in the current layout; a missing or unknown version is left to `layout_faults`.
 
     A force that an earlier import computed from pressures is left out: it is no sensor of its own.
@@ -105,7 +106,7 @@ def _brought_up(dataset: xr.Dataset) -> xr.Dataset:
     return dataset
 
 
-def load_record(path: Path | str, labels: Mapping[str, Sequence[str]] | None = None) -> xr.Dataset:
+def load_record(path: Path | str, labels: Mapping[str, Sequence[str]] | None = None) -> "xr.Dataset":
     """Load a valid record; channels of the layout are float64.
 
     `labels` are those of the machine the record must belong to, e.g. `{"actuator": ["H1", ...]}`; without it
@@ -116,21 +117,17 @@ def load_record(path: Path | str, labels: Mapping[str, Sequence[str]] | None = N
     return dataset.assign({name: dataset[name].astype(float) for name in LAYOUT if name in dataset})
 
 
-def save_record(dataset: xr.Dataset, path: Path | str, *, single: bool = False) -> None:
+def save_record(dataset: "xr.Dataset", path: Path | str, *, single: bool = False) -> None:
     """Write a record whole or not at all, uncompressed, in float64 or, where `single`, in float32 but for its time.
 
     Noise-free motion hardly compresses (15 % smaller with deflate) and takes ten times as long to write. The 24 bits
     of float32 are those of the best converters of sensors.
     Raises `RecordError` if the dataset breaks the layout.
     """
+    from .netcdf import netcdf_content
+
     _refuse(layout_faults(dataset), str(path))
-    plain = dataset.drop_encoding()
-    if single:
-        doubles = {name: column for name, column in plain.data_vars.items() if column.dtype == float}
-        plain = plain.assign(
-            {name: _variable(c.dims, c.values.astype(np.float32), c.attrs) for name, c in doubles.items()}
-        )
-    content = netcdf_content(plain)
+    content = netcdf_content(dataset.drop_encoding(), single=single)
     with write_whole(path) as beside:
         beside.write_bytes(content)
 
@@ -140,7 +137,7 @@ def make_record(
     channels: Mapping[str, Any],
     labels: Mapping[str, Sequence[str]],
     attrs: Mapping[str, Any],
-) -> xr.Dataset:
+) -> "xr.Dataset":
     """Put arrays into the layout, with its units and long names.
 
     Parameters: `time` (n,) [s]; `channels` arrays by name of the layout, or `(dims, values, attributes)` for
@@ -148,6 +145,9 @@ def make_record(
     which `sample_rate_hz` and `layout_version` are added. Raises `RecordError` if that breaks the layout,
     `UnknownNameError` for a plain array under a name that the layout does not have.
     """
+    import pandas as pd
+    import xarray as xr
+
     time = np.asarray(time, dtype=float)
     variables: dict[str, xr.Variable] = {}
     for name, values in channels.items():
@@ -179,7 +179,7 @@ def make_record(
     return record
 
 
-def thinned(record: xr.Dataset, every: int) -> xr.Dataset:
+def thinned(record: "xr.Dataset", every: int) -> "xr.Dataset":
     """Every `every`-th sample of a record, unfiltered; all samples of one too short to keep two.
 
     Its attribute `thinned_from_hz` is the rate before.
@@ -192,23 +192,25 @@ def thinned(record: xr.Dataset, every: int) -> xr.Dataset:
     return kept.assign_attrs(sample_rate_hz=rate, thinned_from_hz=before)  # a copy: both may share their attributes
 
 
-def _variable(dims: Any, values: ArrayLike, attrs: Mapping[str, Any] | None = None) -> xr.Variable:
+def _variable(dims: Any, values: ArrayLike, attrs: Mapping[str, Any] | None = None) -> "xr.Variable":
     """Variable of plain numbers, which xarray need not compare with the arrays of Dask, which it would import."""
+    import xarray as xr
+
     return xr.Variable(dims, np.asarray(values), attrs, fastpath=True)
 
 
-def sample_interval(dataset: xr.Dataset) -> float:
+def sample_interval(dataset: "xr.Dataset") -> float:
     """Time from one sample to the next [s]."""
     time = dataset["time"].values
     return float(time[-1] - time[0]) / (len(time) - 1)
 
 
-def is_measured(dataset: xr.Dataset) -> bool:
+def is_measured(dataset: "xr.Dataset") -> bool:
     """Whether sensors stand between a record and its motion: real ones, or the noise of simulated ones."""
     return str(dataset.attrs.get("kind")) != "simulated" or "noise" in dataset.attrs
 
 
-def require(dataset: xr.Dataset, *names: str) -> None:
+def require(dataset: "xr.Dataset", *names: str) -> None:
     """Raise `RecordError` naming those of `names` that the record does not have."""
     missing = [name for name in names if name not in dataset.variables]
     if missing:
@@ -216,7 +218,7 @@ def require(dataset: xr.Dataset, *names: str) -> None:
         raise RecordError(f"{file}: has no {', '.join(missing)}; it has {', '.join(map(str, dataset.data_vars))}")
 
 
-def refuse_other_machine(machine: "Machine", dataset: xr.Dataset) -> None:
+def refuse_other_machine(machine: "Machine", dataset: "xr.Dataset") -> None:
     """Raise `RecordError` for a record whose components are not those of a machine."""
     for dim, names in machine.labels.items():
         if dim in dataset.coords and [str(x) for x in dataset[dim].values] != list(names):

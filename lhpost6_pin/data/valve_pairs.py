@@ -4,17 +4,21 @@ The model's actuator has `valves` equal servovalves that open alike. Valves A an
 same pressures, the flow of both with the spool x of the mean opening: 2 g(x) = g(x_A) + g(x_B), g of Eq. 4-2.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from ..core.errors import RecordError
 from ..laws.orifice import opening, spool_for_opening
 from ..machine.machine import Machine
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 __all__ = ["with_joint_spools"]
 
 
-def with_joint_spools(machine: Machine, record: xr.Dataset) -> xr.Dataset:
+def with_joint_spools(machine: Machine, record: "xr.Dataset") -> "xr.Dataset":
     """The record with the joint spool of servovalves A and B in `spool_position`; without B's channel as it is.
 
     Where one servovalve of an actuator is open (`valves`), B's spool moves no oil and counts for nothing. Raises

@@ -238,7 +238,8 @@ def _contact_side(
 
 
 def _warn_of_strokes(plant: Plant, test: str, record: xr.Dataset, motion: PlatenMotion) -> None:
-    for end in stroke_ends(plant, record["time"].values, motion.displacement):
+    legs, _ = leg_displacements(plant, motion.displacement)
+    for end in stroke_ends(plant, record["time"].values, legs[:, : plant.spools]):
         log.warning("%s: %s; forces of an end stop are in its record from then on", test, end)
 
 

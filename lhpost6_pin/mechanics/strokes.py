@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.arrays import Array
+from ..core.extremes import finite_peaks
 from .plant import Plant
-from .pose import leg_displacements
 
 __all__ = ["StrokeEnd", "stroke_ends"]
 
@@ -31,13 +31,11 @@ class StrokeEnd(NamedTuple):
         )
 
 
-def stroke_ends(plant: Plant, time: ArrayLike, displacement: Array) -> list[StrokeEnd]:
-    """Actuators that reach their stroke along a motion of C and Euler angles (n, 6), in file order; time (n,) [s]."""
-    legs, _ = leg_displacements(plant, displacement)
-    moved, found = np.abs(legs[:, : plant.spools]), []
-    for actuator, size in zip(plant.machine.actuators, moved.T, strict=True):
-        there = size >= _REACHED * actuator.stroke
-        if there.any():
-            first = float(np.asarray(time, float)[int(there.argmax())])
-            found.append(StrokeEnd(actuator.name, first, float(np.nanmax(size)), actuator.stroke))
+def stroke_ends(plant: Plant, time: ArrayLike, elongation: Array) -> list[StrokeEnd]:
+    """Actuators that reach their stroke at a time (n,) [s], in file order, of elongations (n, n_actuators) [m]."""
+    found = []
+    for actuator, peak, moved in zip(plant.machine.actuators, finite_peaks(elongation), elongation.T, strict=True):
+        if peak >= (reached := _REACHED * actuator.stroke):
+            first = float(np.asarray(time, float)[int((np.abs(moved) >= reached).argmax())])
+            found.append(StrokeEnd(actuator.name, first, float(peak), actuator.stroke))
     return found

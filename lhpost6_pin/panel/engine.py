@@ -12,6 +12,7 @@ import numpy as np
 from ..control.controller import Controller, make_controller
 from ..control.loop import step_packed
 from ..control.settings import ControllerSettings
+from ..control.tables import make_scratch
 from ..core.arrays import Array
 from ..core.errors import ControllerError
 from ..core.names import SAMPLE_RATE
@@ -79,7 +80,7 @@ class Engine:
         self.pressure, self.trip, self._tripped_at = "low", "", 0
         self._number = 0
         self._place, self._lifted, self._state = "raised", True, PlantState.WAITING
-        self._memory = self._controller.init()
+        self._memory, self._scratch = self._controller.init(), make_scratch(plant).packed
         self._command = rest.spool.copy()
         self._last = 0
         self._now = Measured.of(np.concatenate([np.zeros(18), rest.force]))
@@ -275,7 +276,7 @@ class Engine:
                 wanted = None
             else:
                 command = np.empty(len(self._command))
-                step_packed(k, inputs, *reading.sensors, *self._packed, self._memory, command)
+                step_packed(k, inputs, *reading.sensors, *self._packed, self._memory, self._scratch, command)
                 self._command = command
         else:  # to be shown; nothing is commanded that could saturate
             self._interlocks.look(now, np.zeros(len(self._command)))

@@ -27,7 +27,7 @@ def run_remarks(test: SimulatedTest) -> list[str]:
     if run.diverged:
         return []
     joints = joints_beyond(run.plant, run.time, run.q)
-    return [*joints, *run_doubts(run, channel(record, "platen_displacement"))]
+    return [*joints, *run_doubts(run, channel(record, "actuator_displacement"))]
 
 
 def notes_of_run(run: Run, remarks: Sequence[str]) -> list[str]:

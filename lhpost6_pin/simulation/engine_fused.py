@@ -9,15 +9,28 @@ from typing import NamedTuple
 import numpy as np
 
 from ..control.loop import control_sample
+from ..control.tables import unpack_control, unpack_scratch
 from ..core.arrays import Array
-from ..core.compiled import INTEGER, MATRIX, VECTOR, compiled, compiled_inline, copy_scaled
+from ..core.compiled import (
+    BOOLEAN,
+    INTEGER,
+    MATRIX,
+    SCALAR,
+    VECTOR,
+    compiled,
+    compiled_inline,
+    compiled_source,
+    copy_scaled,
+    tuple_type,
+)
 from ..mechanics.forward_dynamics import platen_acceleration
 from ..mechanics.moving_parts import bodies_acceleration
 from ..mechanics.schemes import DQ, TAU, V_SEEN, A, V, dexp_inverse, kick, open_step, rates_stage, staggered_stage
 from ..mechanics.spatial import integrate
+from ..mechanics.tables import unpack_tables
 from ..mechanics.workspace import unpack_workspace
 
-__all__ = ["LOG_TYPES", "Log", "Signals", "Span", "log_packed", "run_fused"]
+__all__ = ["LOG_TYPES", "RUN_TYPES", "Log", "Signals", "Span", "explicit_run", "log_packed", "staggered_run"]
 
 
 class Span(NamedTuple):
@@ -26,8 +39,7 @@ class Span(NamedTuple):
     scheme: int  # 0 semi_implicit, 1 euler, 2 rk4
     first: int  # controller samples first..last (exclusive)
     last: int
-    steps: int  # model steps per sample
-    dt: float  # of one [s]
+    dt: float  # of a model step [s]
     closed: bool  # loop closed by the controller; else recorded spools
     every: int  # samples per row of the log
 
@@ -38,7 +50,9 @@ class Signals(NamedTuple):
     drive: Array  # (n, columns) of the controller's reference generators, closed loop
     memory: Array  # of the controller
     command: Array  # (n, n_actuators) of every sample, closed loop
-    spool: Array  # closed: (steps, n_actuators) of the last sample; open: (n * k, n_actuators), k rows a sample
+    spool: Array  # (n * k, n_actuators) of every sample, k rows each, open loop
+    window: Array  # (steps, n_actuators) of the last sample
+    scratch: Array  # of the controller, packed
 
 
 class Log(NamedTuple):
@@ -168,46 +182,76 @@ def _semi_implicit_step(dt, tables, ws, window, j, work, a):
     return status
 
 
+@compiled_source
+def _fill_window(sample, span, tables, ws, control, scratch, signals, window):
+    """Fill the spools (n_steps, n_actuators) of a sample's steps, by the controller or from those of a record.
+
+    Returns the number of commands clipped.
+    """
+    if span.closed:
+        return control_sample(
+            sample, signals.drive, tables, ws, control, signals.memory, scratch, signals.command, window
+        )
+    rows, steps = signals.spool.shape[0] // signals.command.shape[0], window.shape[0]
+    for j in range(steps):
+        row = sample * rows + j * rows // steps
+        for i in range(window.shape[1]):
+            window[j, i] = signals.spool[row, i]
+    return 0
+
+
 @compiled
-def run_fused(span, tables, ws, control, signals, log):
-    """Run the samples of a span with tables and workspace of the plant and tables of the controller.
+def staggered_run(span, packed, buffer, controller, signals, log):
+    """Run the samples of a span with the staggered scheme; tables, workspace and the controller's tables packed.
 
     Returns (status, samples done, commands clipped).
     """
-    dt, steps, motion, q = span.dt, span.steps, ws.motion, ws.q
-    nu = signals.command.shape[1]
-    window = signals.spool if span.closed else np.zeros((steps, nu))
+    tables, ws, control = unpack_tables(packed), unpack_workspace(buffer), unpack_control(controller)
+    scratch, motion, window = unpack_scratch(signals.scratch), ws.motion, signals.window
     work, a = np.zeros((9, 6)), np.zeros(motion.shape[1])
-    per_sample = signals.spool.shape[0] // max(1, signals.command.shape[0])
     clipped = 0
-    if span.scheme == 0:
-        open_step(motion, dt)
+    open_step(motion, span.dt)
     for sample in range(span.first, span.last):
-        if span.closed:
-            if span.scheme != 0:  # the other schemes leave the ports of their last stage
-                copy_scaled(1.0, motion[V], motion[V_SEEN])
-                rates_stage(q, ws.z, tables, ws, window[0])
-                _accelerate(tables, ws, motion[A])
-            clipped += control_sample(
-                sample, signals.drive, tables, ws, control, signals.memory, signals.command, window
-            )
-        else:
-            for j in range(steps):
-                row = sample * per_sample + j * per_sample // steps
-                for i in range(nu):
-                    window[j, i] = signals.spool[row, i]
+        clipped += _fill_window(sample, span, tables, ws, control, scratch, signals, window)
         if sample % span.every == 0:
             _log_sample(sample // span.every, ws, window, log)
-        status = 0
-        for j in range(steps):
-            if span.scheme == 0:
-                status = _semi_implicit_step(dt, tables, ws, window, j, work, a)
-            elif span.scheme == 1:
-                status = _euler_step(dt, tables, ws, window[j])
-            else:
-                status = _rk4_step(dt, tables, ws, window[j])
+        for j in range(window.shape[0]):
+            status = _semi_implicit_step(span.dt, tables, ws, window, j, work, a)
             if status != 0:
-                break
-        if status != 0:
-            return status, sample + 1, clipped
+                return status, sample + 1, clipped
     return 0, span.last, clipped
+
+
+@compiled
+def explicit_run(span, packed, buffer, controller, signals, log):
+    """`staggered_run` with one of the other two schemes, whose code is longer than that of the default."""
+    tables, ws, control = unpack_tables(packed), unpack_workspace(buffer), unpack_control(controller)
+    scratch, motion, window = unpack_scratch(signals.scratch), ws.motion, signals.window
+    clipped = 0
+    for sample in range(span.first, span.last):
+        if span.closed:  # these schemes leave the ports of their last stage
+            copy_scaled(1.0, motion[V], motion[V_SEEN])
+            rates_stage(ws.q, ws.z, tables, ws, window[0])
+            _accelerate(tables, ws, motion[A])
+        clipped += _fill_window(sample, span, tables, ws, control, scratch, signals, window)
+        if sample % span.every == 0:
+            _log_sample(sample // span.every, ws, window, log)
+        for j in range(window.shape[0]):
+            if span.scheme == 1:
+                status = _euler_step(span.dt, tables, ws, window[j])
+            else:
+                status = _rk4_step(span.dt, tables, ws, window[j])
+            if status != 0:
+                return status, sample + 1, clipped
+    return 0, span.last, clipped
+
+
+RUN_TYPES = (
+    tuple_type(Span, *[INTEGER] * 3, SCALAR, BOOLEAN, INTEGER),
+    VECTOR,
+    VECTOR,
+    VECTOR,
+    tuple_type(Signals, *[MATRIX] * 5, VECTOR),
+    tuple_type(Log, *[MATRIX] * 5),
+)
+"""Types of the arguments of both."""

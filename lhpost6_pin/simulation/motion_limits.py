@@ -9,10 +9,9 @@ The comparison and the largest scale that fits are in `motions.limits`.
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from ..core.arrays import Array
 from ..core.errors import OutOfRangeError
@@ -37,6 +36,9 @@ from ..motions import (
     limit_peaks,
 )
 from ..motions.limits import SI, Units
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["FLOW", "FlowRemedy", "Judgement", "check_motion_limits", "fitting_scale", "flow_remedies", "judge_motion"]
 __all__ += ["judge_record", "refuse_blocked_axes"]
@@ -139,7 +141,7 @@ def judge_motion(
     return Judgement(limit_peaks(motion, replace(bounds, reserve=0.0), demands), fits)
 
 
-def judge_record(plant: Plant, record: xr.Dataset, *, fits: bool = True) -> Judgement | None:
+def judge_record(plant: Plant, record: "xr.Dataset", *, fits: bool = True) -> Judgement | None:
     """Judgement of a record's achieved motion and, with `fits`, of its target; None without motion or with gaps.
 
     Raises OutOfRangeError if the actuators cannot hold what is mounted at rest.
@@ -155,7 +157,7 @@ def judge_record(plant: Plant, record: xr.Dataset, *, fits: bool = True) -> Judg
     return judge_motion(plant, achieved, target, _response_of(plant, record))
 
 
-def _response_of(plant: Plant, record: xr.Dataset) -> Array | None:
+def _response_of(plant: Plant, record: "xr.Dataset") -> Array | None:
     """Wrench (n, 6) of the specimen on the platen at B in platen axes, as a simulated record has it; else None."""
     if plant.machine.specimen is None or "specimen_wrench" not in record:
         return None
@@ -163,7 +165,7 @@ def _response_of(plant: Plant, record: xr.Dataset) -> Array | None:
     return from_interface(plant, wrench) if np.isfinite(wrench).all() else None
 
 
-def _motion_of(record: xr.Dataset, who: str) -> PlatenMotion | None:
+def _motion_of(record: "xr.Dataset", who: str) -> PlatenMotion | None:
     names = [f"{who}_{quantity}" for quantity in ("displacement", "velocity", "acceleration")]
     if not all(name in record for name in names):
         return None

@@ -1,10 +1,9 @@
 """The record of a run, in the layout of measured tests."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ..core.arrays import Array
 from ..core.names import AXES
@@ -27,6 +26,9 @@ from ..motions import TargetSpectrum
 from .simulate import Run
 from .specimen_response import interface_wrench, point_response
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 __all__ = ["record_of_run", "reference_channels", "required_channel"]
 
 _OF_POINTS = {
@@ -37,7 +39,7 @@ _OF_POINTS = {
 """Channels of a specimen's points: unit of translations, and name."""
 
 
-def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | None = None) -> xr.Dataset:
+def record_of_run(run: Run, attrs: Mapping[str, Any], reference: PlatenMotion | None = None) -> "xr.Dataset":
     """Record of a simulated test.
 
     attrs: further global attributes (`test`, `title`, ...). reference: target at the run's samples, if any; its
@@ -131,8 +133,10 @@ def reference_channels(reference: PlatenMotion) -> dict[str, Any]:
     return channels
 
 
-def required_channel(spectrum: TargetSpectrum) -> xr.DataArray:
+def required_channel(spectrum: TargetSpectrum) -> "xr.DataArray":
     """Response spectrum that a target was to have: not-a-number for axes without one."""
+    import xarray as xr
+
     columns = [spectrum.acceleration.get(axis, np.full(len(spectrum.frequency), np.nan)) for axis in AXES]
     return xr.DataArray(
         np.column_stack(columns),

@@ -3,10 +3,9 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from ..control import ControllerSettings, make_controller
 from ..control.inverse import InverseFilter, apply_inverse
@@ -30,6 +29,9 @@ from .outputs import record_of_run, required_channel
 from .simulate import ClosedLoop, OpenLoop, PluggedLoop, Run, simulate
 from .trouble import with_pressure_trouble
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 __all__ = ["SimulatedTest", "loop_for", "rehearse", "replay", "test_facts"]
 
 
@@ -37,7 +39,7 @@ class SimulatedTest(NamedTuple):
     """A simulated test: the run and its record."""
 
     run: Run
-    record: xr.Dataset
+    record: "xr.Dataset"
 
     def plot(self) -> Any:
         """Return the report, as `plot_of`."""
@@ -131,7 +133,7 @@ def loop_for(
 
 def replay(
     machine: Machine,
-    record: xr.Dataset,
+    record: "xr.Dataset",
     *,
     attrs: Mapping[str, Any],
     friction: Array | None = None,
@@ -173,7 +175,7 @@ def replay(
     return SimulatedTest(run, record_of_run(run, {"spool_interpolation": "held" if held else "band-limited", **attrs}))
 
 
-def _refuse_wrong_unit(names: Sequence[str], spools: Array, record: xr.Dataset) -> None:
+def _refuse_wrong_unit(names: Sequence[str], spools: Array, record: "xr.Dataset") -> None:
     """Raise RecordError for recorded spools (n, n_actuators) that are no shares of full stroke."""
     peaks = np.abs(spools).max(axis=0)
     worst = int(np.argmax(np.where(np.isfinite(peaks), peaks, 0.0)))
@@ -201,7 +203,7 @@ def _usable(run: Run) -> Run:
     return replace(run, **rows, command=command)
 
 
-def _start(plant: Plant, record: xr.Dataset, friction: Array | None) -> State:
+def _start(plant: Plant, record: "xr.Dataset", friction: Array | None) -> State:
     """Zero pose at rest with the chamber pressures of the record's first sample, and states of `friction`."""
     zero = specimen_at_rest(plant)
     z = zero.z.copy() if friction is None else zero.z + friction

@@ -16,8 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..control.loop import ACTUATOR, AXIS, CANCELLER, CONTROL_TYPES, control_packed, pack_control, sense_packed
+from ..control.loop import CONTROL_TYPES, control_packed, sense_packed
 from ..control.plug import Feedback, start_plugged
+from ..control.tables import make_scratch
 from ..core.arrays import Array
 from ..core.compiled import entry_point
 from ..core.names import ENGINES, SAMPLE_RATE, SCHEMES
@@ -29,7 +30,7 @@ from ..mechanics.valve_delay import delayed_spools
 from ..mechanics.workspace import Workspace, make_workspace
 from .coupling import Coupling, CouplingOptions, CouplingResult, make_coupling
 from .divergence import scheme_divergence
-from .engine_fused import LOG_TYPES, Log, Signals, Span, log_packed, run_fused
+from .engine_fused import LOG_TYPES, RUN_TYPES, Log, Signals, Span, explicit_run, log_packed, staggered_run
 from .engine_pinocchio import make_stepper
 from .loops import ClosedLoop, Loop, OpenLoop, PluggedLoop, check_closed_loop, check_options, check_run
 from .snapshot import EVERY, Watch, take_snapshot
@@ -39,8 +40,8 @@ __all__ += ["fastest_engine", "simulate", "simulate_many"]
 
 log = logging.getLogger(__name__)
 
-_CHUNK = 1024
-"""Controller samples between two progress reports."""
+_CHUNK, _FUSED_CHUNK = 1024, 8192
+"""Controller samples between two progress reports; at the end of a fused chunk the interpreter may be waited for."""
 _STOPPED = -3
 """Status of a run that its `stop` has ended."""
 
@@ -105,19 +106,20 @@ def simulate(
     if isinstance(loop, OpenLoop):
         start, (spool, clipped) = loop.start, _clip(loop.spool)
     else:
-        start, spool, clipped = loop.rest.state, np.tile(loop.rest.spool, (steps, 1)), 0
+        start, spool, clipped = loop.rest.state, np.array(loop.rest.spool, float)[None], 0
     ws = make_workspace(plant, start)
     widths = plant.model.nq, plant.model.nv, plant.model.nv, len(plant.states), plant.spools
     log_ = Log(*(np.zeros((-(-samples // record_every), width)) for width in widths))
     closed = not isinstance(loop, OpenLoop)
+    window = np.tile(spool[0], (steps, 1))
     command = np.tile(spool[0], (samples, 1)) if closed else np.zeros((samples, plant.spools))
     coupled = make_coupling(plant, scheme, steps_per_second, coupling)
     evaluated = coupled.evaluate if coupled else partial(evaluate_derivatives, plant)
-    status, done = evaluated(ws, np.ascontiguousarray(spool[0])), 0
+    status, done = evaluated(ws, window[0]), 0
     if status == 0:
         compiled = isinstance(loop, ClosedLoop)
-        span = Span(SCHEMES.index(scheme), 0, samples, steps, 1.0 / steps_per_second, compiled, record_every)
-        job = _Job(plant, loop, ws, log_, span, spool, command, progress, watch, stop, coupled)
+        span = Span(SCHEMES.index(scheme), 0, samples, 1.0 / steps_per_second, compiled, record_every)
+        job = _Job(plant, loop, ws, log_, span, spool, window, command, progress, watch, stop, coupled)
         status, done, more = (_run_fused if engine == "fused" else _run_pinocchio)(job)
         clipped += more
     exchanged = coupled.result() if coupled else None
@@ -186,7 +188,8 @@ class _Job(NamedTuple):
     ws: Workspace
     log: Log
     span: Span  # all samples
-    spool: Array  # (samples * k, n_actuators), open loop; (steps, n_actuators) of the last sample, closed
+    spool: Array  # (samples * k, n_actuators) recorded, open loop
+    window: Array  # (steps, n_actuators) of the last sample
     command: Array  # (samples, n_actuators), closed loop
     progress: Progress | None
     watch: Watch | None
@@ -219,7 +222,7 @@ def _run_pinocchio(job: _Job) -> tuple[int, int, int]:
     advance = coupled.advance if coupled else make_stepper(plant, SCHEMES[span.scheme], span.dt)
     evaluated = coupled.evaluate if coupled else partial(evaluate_derivatives, plant)
     closed = not isinstance(job.loop, OpenLoop)
-    window = job.spool if closed else np.zeros((span.steps, plant.spools))
+    window = job.window
     spools, log = _spools_from(job), entry_point(log_packed, LOG_TYPES)
     clipped = 0
     for sample in range(span.last):
@@ -253,10 +256,10 @@ def _spools_from(job: _Job) -> Callable[[int, Array], int]:
         return recorded
     if isinstance(loop, ClosedLoop):
         drive, call = np.ascontiguousarray(loop.drive, float), entry_point(control_packed, CONTROL_TYPES)
-        control, memory = loop.controller.tables.packed, loop.controller.init()
+        control, memory, scratch = loop.controller.tables.packed, loop.controller.init(), make_scratch(plant).packed
 
         def compiled_loop(sample: int, window: Array) -> int:
-            return int(call(sample, drive, packed, buffer, control, memory, command, window))
+            return int(call(sample, drive, packed, buffer, control, memory, scratch, command, window))
 
         return compiled_loop
     own = start_plugged(loop.controller, plant, loop.rest, (loop.displacement, loop.velocity, loop.acceleration))
@@ -274,21 +277,22 @@ def _spools_from(job: _Job) -> Callable[[int, Array], int]:
 
 def _run_fused(job: _Job) -> tuple[int, int, int]:
     """Run all samples in compiled chunks; returns (status, samples done, commands clipped)."""
-    loop, none = job.loop, np.zeros((1, 1))
+    loop = job.loop
     if isinstance(loop, ClosedLoop):
-        control, memory = loop.controller.tables, loop.controller.init()
+        control, memory = loop.controller.tables.packed, loop.controller.init()
         drive = np.ascontiguousarray(loop.drive, float)
     else:
-        control = pack_control(np.zeros(1, AXIS), np.zeros(1, ACTUATOR), none, np.zeros(0, CANCELLER))
-        memory = drive = none
-    signals = Signals(drive, memory, job.command, job.spool)
-    clipped, chunk, samples = 0, EVERY if job.observed else _CHUNK, job.span.last
+        control, memory, drive = np.zeros(3), *np.zeros((2, 1, 1))
+    signals = Signals(drive, memory, job.command, job.spool, job.window, make_scratch(job.plant).packed)
+    call = entry_point(staggered_run if job.span.scheme == 0 else explicit_run, RUN_TYPES)
+    tables, buffer = job.plant.tables.packed, job.ws.buffer
+    clipped, chunk, samples = 0, EVERY if job.observed else _FUSED_CHUNK, job.span.last
     for first in range(0, samples, chunk):
         last = min(first + chunk, samples)
         if job.look(first):
             return _STOPPED, first, clipped
         span = job.span._replace(first=first, last=last)
-        status, done, more = run_fused(span, job.plant.tables, job.ws, control, signals, job.log)
+        status, done, more = call(span, tables, buffer, control, signals, job.log)
         clipped += more
         if status:
             return status, done, clipped

@@ -11,7 +11,7 @@ from ..core.arrays import Array
 from ..core.extremes import extremes
 from ..machine.components import Actuator
 from ..mechanics.plant import Plant
-from ..mechanics.pose import platen_motion
+from ..mechanics.pose import leg_displacements, platen_motion
 from ..mechanics.strokes import stroke_ends
 from .divergence import scheme_divergence
 from .simulate import Run
@@ -109,10 +109,10 @@ def _unphysical(chamber: _Chamber, at: float) -> str:
     return f"{what}; {_REMEDY.format(more=_WITH if chamber.vapour else _WITHOUT)}"
 
 
-def run_doubts(run: Run, displacement: Array | None = None) -> list[str]:
+def run_doubts(run: Run, elongation: Array | None = None) -> list[str]:
     """Remarks on a run: chambers below the return pressure, strokes that reached their ends.
 
-    displacement (n, 6): that of C and Euler angles in this run, where it is known.
+    elongation (n, n_actuators): of the actuators in this run [m], where it is known.
     """
     low, found = float(run.plant.supply[1]), []
     for chamber, at, least in _lowest(run, low):
@@ -123,9 +123,10 @@ def run_doubts(run: Run, displacement: Array | None = None) -> list[str]:
         if 0.0 <= least < chamber.vapour:
             lifts = f", and {chamber.actuator.name}, which cannot pull, hardly bears on the platen" * chamber.bears
             found[-1] += f"; its oil cavitates below {chamber.vapour / 1e6:.3g} MPa{lifts}"
-    if displacement is None:
-        displacement = platen_motion(run.plant, run.q, run.v, run.a).displacement
-    for end in stroke_ends(run.plant, run.time, displacement):
+    if elongation is None:
+        legs, _ = leg_displacements(run.plant, platen_motion(run.plant, run.q, run.v, run.a).displacement)
+        elongation = legs[:, : run.plant.spools]
+    for end in stroke_ends(run.plant, run.time, elongation):
         actuator = next(a for a in run.plant.machine.actuators if a.name == end.actuator)
         bumper = "its elastic bumper, whose numbers are assumed, acts there"
         found.append(f"{end}; {bumper}" if actuator.bumper_travel else str(end))

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..control import Controller, ControllerSettings, controlled
 from ..control.filters import sampled_response
-from ..control.loop import CANCELLER
+from ..control.tables import CANCELLER
 from ..core.arrays import Array, Complex
 from ..core.errors import SimulationError
 from ..core.names import AXES, SAMPLE_RATE

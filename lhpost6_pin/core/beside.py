@@ -1,0 +1,27 @@
+"""Work beside the main thread of a command, while that waits or runs compiled code, which releases the interpreter."""
+
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
+
+__all__ = ["beside", "import_all"]
+
+
+def beside(function: Callable[..., object], *arguments: object) -> None:
+    """Start a function that prepares what is needed later in a thread that ends with the process.
+
+    Its errors are passed over: who needs the same later does it again, and meets them.
+    """
+
+    def run() -> None:
+        with suppress(Exception):
+            function(*arguments)
+
+    threading.Thread(target=run, name=function.__name__, daemon=True).start()
+
+
+def import_all(*modules: str) -> None:
+    """Import modules by name. Who imports one of them meanwhile waits for it."""
+    for name in modules:
+        import_module(name)

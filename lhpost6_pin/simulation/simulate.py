@@ -40,8 +40,8 @@ __all__ += ["fastest_engine", "simulate", "simulate_many"]
 
 log = logging.getLogger(__name__)
 
-_CHUNK, _FUSED_CHUNK = 1024, 8192
-"""Controller samples between two progress reports; at the end of a fused chunk the interpreter may be waited for."""
+_CHUNK = SAMPLE_RATE
+"""Controller samples between two progress reports: a second of motion."""
 _STOPPED = -3
 """Status of a run that its `stop` has ended."""
 
@@ -286,7 +286,7 @@ def _run_fused(job: _Job) -> tuple[int, int, int]:
     signals = Signals(drive, memory, job.command, job.spool, job.window, make_scratch(job.plant).packed)
     call = entry_point(staggered_run if job.span.scheme == 0 else explicit_run, RUN_TYPES)
     tables, buffer = job.plant.tables.packed, job.ws.buffer
-    clipped, chunk, samples = 0, EVERY if job.observed else _FUSED_CHUNK, job.span.last
+    clipped, chunk, samples = 0, EVERY if job.observed else _CHUNK, job.span.last
     for first in range(0, samples, chunk):
         last = min(first + chunk, samples)
         if job.look(first):

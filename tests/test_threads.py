@@ -54,3 +54,17 @@ def test_two_processors_work_with_threads(monkeypatch):
     monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 1})
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     assert "MainThread" not in by_threads(lambda _: threading.current_thread().name, range(2))
+
+
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_no_more_threads_than_jobs_work_at_once(jobs):
+    """With three, all three parts wait for each other; alone, one after the other would wait forever."""
+    together, threads = threading.Barrier(jobs), set()
+
+    def meet(part: int) -> int:
+        threads.add(threading.get_ident())
+        together.wait(10.0)
+        return part
+
+    assert list(by_threads(meet, range(3), jobs)) == [0, 1, 2]
+    assert len(threads) == jobs

@@ -18,12 +18,13 @@ _P = TypeVar("_P")
 _R = TypeVar("_R")
 
 
-def by_threads(function: Callable[[_P], _R], parts: Sequence[_P]) -> Iterator[_R]:
+def by_threads(function: Callable[[_P], _R], parts: Sequence[_P], jobs: int = -1) -> Iterator[_R]:
     """What a function gives for each part, in their order; the first error that it raises ends the work.
 
-    It runs in the caller's context: numpy's handling of floating-point errors is as there.
+    It runs in the caller's context: numpy's handling of floating-point errors is as there. `jobs` is the largest number
+    of threads, -1 that of this process.
     """
-    if (count := min(_threads(), len(parts))) < 2:
+    if (count := min(_threads() if jobs < 1 else jobs, len(parts))) < 2:
         yield from map(function, parts)
         return
     each = [(copy_context(), part) for part in parts]

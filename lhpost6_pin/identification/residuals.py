@@ -64,6 +64,10 @@ class Residuals(NamedTuple):
         """All columns side by side (n, k)."""
         return np.hstack(self)
 
+    def less(self, before: "Residuals") -> "Residuals":
+        """Change from others; no columns where these have none."""
+        return Residuals(*(a - b if a.shape[1] else a for a, b in zip(self, before, strict=True)))
+
 
 class Path(NamedTuple):
     """A test's motion in a plant's coordinates and ports, and the resulting friction states."""

@@ -1,6 +1,6 @@
 """Normal equations of a calibration: summed over tests and columns, corrected for noise, solved within bounds."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from functools import cached_property
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from ...core.arrays import Array, Complex, Mask
 from ...core.progress import Progress
+from ...core.threads import by_threads
 from ...machine.parameters import Parameters
 from .bin_rows import BinRows, SparseBins, bin_rows, row_by_column
 from .operating_point import OperatingPoint
@@ -82,7 +83,7 @@ class NormalEquations:
     @cached_property
     def rows(self) -> list[BinRows]:
         """Rows of the derivatives of every test."""
-        return [bin_rows(slopes, r.shape[1]) for slopes, r in zip(self.slope, self.residual, strict=True)]
+        return _rows(self.problem, self.slope, self.residual)
 
     def released(self) -> "NormalEquations":
         """Itself, without what is kept to sum it again at once, which fills memory."""
@@ -93,13 +94,24 @@ class NormalEquations:
 
     def of(self, tests: Sequence[int], columns: Mask | None = None) -> tuple[Array, Array]:
         """Matrix (p, p) and right side (p,) of some tests and columns (c,), by default all."""
-        count = len(self.slope[0])
-        matrix, right = np.zeros((count, count)), np.zeros(count)
-        for t in tests:
-            matrix += self.rows[t].squares(np.sqrt(self.power[t]), columns)
-            right += _dot(self.rows[t], self.residual[t], self.power[t], columns)
+        rows = self.rows
+
+        def of_one(t: int) -> tuple[Array, Array]:
+            matrix = rows[t].squares(np.sqrt(self.power[t]), columns)
+            return matrix, _dot(rows[t], self.residual[t], self.power[t], columns)
+
+        matrix, right = self._summed(of_one, tests)
         more, side = self.correction(tests, columns)
         return matrix - more, right - side
+
+    def _summed(self, function: Callable[[int], tuple[Array, Array]], tests: Sequence[int]) -> tuple[Array, Array]:
+        """Sums, in the order of the tests, of the matrix (p, p) and right side (p,) that a function gives for each."""
+        count = len(self.slope[0])
+        matrix, right = np.zeros((count, count)), np.zeros(count)
+        for more, side in by_threads(function, tests, self.problem.jobs):
+            matrix += more
+            right += side
+        return matrix, right
 
     def right_side(self, residual: Sequence[Complex]) -> Array:
         """Right side (p,) of all tests for whitened bins (m, c) of each in place of its residual, not corrected."""
@@ -107,14 +119,16 @@ class NormalEquations:
 
     def correction(self, tests: Sequence[int], columns: Mask | None = None) -> tuple[Array, Array]:
         """Contributions of noise to matrix (p, p) and right side (p,), which `of` subtracts; zero if not corrected."""
-        count = len(self.slope[0])
-        matrix, right = np.zeros((count, count)), np.zeros(count)
-        if self.bias is not None:
-            for t in tests:
-                more, side = self.bias.of(t, columns, self.power[t])
-                matrix += more
-                right += side
-        return matrix, right
+        bias = self.bias
+        rows = [] if bias is None else bias.rows
+
+        def of_one(t: int) -> tuple[Array, Array]:
+            both = [(own[t], rest[t]) for own, rest in zip(rows, bias.residual if bias else [], strict=True)]
+            matrix = sum(own.squares(np.sqrt(self.power[t]), columns) for own, _ in both) / len(both)
+            right = sum(_dot(own, rest, self.power[t], columns) for own, rest in both) / len(both)
+            return np.asarray(matrix), np.asarray(right)
+
+        return self._summed(of_one, tests if rows else ())
 
     @cached_property
     def whole(self) -> tuple[Array, Array]:
@@ -141,7 +155,7 @@ class NoiseBias:
 
         Changes of derivatives by unknowns of `known`, which is corrected, are reused.
         """
-        shared, fresh = _shared(normal.problem, known)
+        self.problem, (shared, fresh) = normal.problem, _shared(normal.problem, known)
         self.residual: list[list[Complex]] = []  # by replica and test
         self.slope: list[list[list[SparseBins]]] = []
         for i, (replica, report) in enumerate(zip(normal.problem.replicas, reports, strict=True)):
@@ -167,14 +181,13 @@ class NoiseBias:
     def rows(self) -> list[list[BinRows]]:
         """Rows of the changes of derivatives, by replica and test."""
         pairs = zip(self.slope, self.residual, strict=True)
-        return [[bin_rows(s, r.shape[1]) for s, r in zip(slope, rest, strict=True)] for slope, rest in pairs]
+        return [_rows(self.problem, slope, rest) for slope, rest in pairs]
 
-    def of(self, test: int, columns: Mask | None, power: Array) -> tuple[Array, Array]:
-        """Matrix (p, p) and right side (p,) of one test and some columns, over the power (m, c) of the residual."""
-        both = [(rows[test], rest[test]) for rows, rest in zip(self.rows, self.residual, strict=True)]
-        matrix = sum(rows.squares(np.sqrt(power), columns) for rows, _ in both) / len(both)
-        right = sum(_dot(rows, rest, power, columns) for rows, rest in both) / len(both)
-        return np.asarray(matrix), np.asarray(right)
+
+def _rows(problem: Problem, slope: Sequence[Sequence[SparseBins]], residual: Sequence[Complex]) -> list[BinRows]:
+    """Rows of the derivatives of every test's residual."""
+    pairs = list(zip(slope, residual, strict=True))
+    return list(by_threads(lambda one: bin_rows(one[0], one[1].shape[1]), pairs, problem.jobs))
 
 
 def _shared(problem: Problem, known: NormalEquations | None, again: Mask | None = None) -> tuple[dict[int, int], Mask]:

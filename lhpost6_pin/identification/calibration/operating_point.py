@@ -4,9 +4,10 @@ from dataclasses import replace
 from typing import Protocol
 
 from ...core.arrays import Array
+from ...core.threads import by_threads
 from ...mechanics.plant import Plant
 from ..prepare import MeasuredTest
-from ..residuals import Path, evaluate_residuals, follow, with_ports
+from ..residuals import Path, Residuals, evaluate_residuals, follow, with_ports
 from .free_parameters import FreeParameter
 from .sensor_errors import SensorUnknown, corrected
 
@@ -23,6 +24,7 @@ class Unknowns(Protocol):
     unknowns: tuple[SensorUnknown, ...]
     tests: tuple[MeasuredTest, ...]
     kinds: tuple[str, ...]
+    jobs: int  # threads
 
     def plant_at(self, x: Array) -> Plant:
         """Plant with its parameters set to x (p,)."""
@@ -35,10 +37,14 @@ class OperatingPoint:
     def __init__(self, problem: Unknowns, x: Array) -> None:
         """Evaluate a problem's tests at x (p,)."""
         self.x, self.plant = x, problem.plant_at(x)
-        self.tests = [corrected(t, problem.unknowns, x[len(problem.parameters) :]) for t in problem.tests]
-        self.paths = [follow(self.plant, t) for t in self.tests]
-        pairs = zip(self.tests, self.paths, strict=True)
-        self.residuals = [evaluate_residuals(self.plant, t, problem.kinds, path=p) for t, p in pairs]
+
+        def evaluated(raw: MeasuredTest) -> tuple[MeasuredTest, Path, Residuals]:
+            test = corrected(raw, problem.unknowns, x[len(problem.parameters) :])
+            path = follow(self.plant, test)
+            return test, path, evaluate_residuals(self.plant, test, problem.kinds, path=path)
+
+        each = by_threads(evaluated, problem.tests, problem.jobs)
+        self.tests, self.paths, self.residuals = map(list, zip(*each, strict=True))
         self._extended: dict[tuple[str, ...], tuple[Plant, list[Path]]] = {self.plant.ports: (self.plant, self.paths)}
 
     def with_ports_of(self, other: Plant) -> tuple[Plant, list[Path]]:

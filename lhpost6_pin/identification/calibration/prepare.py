@@ -1,25 +1,26 @@
 """Preparation of a campaign for a fit: checked, aligned, fused, with noisier copies of every test."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
 from ...core.errors import RecordError
+from ...core.threads import by_threads
 from ...data.channels import calibrated_channels, channel_name, columns_of
 from ...data.layout_faults import layout_faults
 from ...data.observable import observable
 from ...data.records import is_measured
-from ...data.sensors import SensorSet
+from ...data.sensors import SensorSet, add_noise
 from ...machine.machine import Machine
 from ...machine.parameters import Parameters
 from ...mechanics.plant import make_plant
 from ...mechanics.pose import plant_motion
 from ...simulation.specimen_response import driven_wrenches
 from ..friction_start import start_deviation
-from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, prepare_noisier, prepare_test
+from ..prepare import CALIBRATION, MeasuredTest, Policy, align_records, prepare_test
 from .problem import KINDS, Problem, ResidualBands
 from .sensor_errors import removed_delays
 from .usable_tests import too_short
@@ -75,21 +76,24 @@ def prepare_problem(
         sways = driven_wrenches(mounted, moved, test.dt) - driven_wrenches(plant, moved, test.dt)
         return replace(test, carried=sways)
 
-    def noisier(record: xr.Dataset, policy: Policy) -> MeasuredTest:
-        return carrying(prepare_noisier(plant, record, sensors, policy, rng))
+    def noisier(records: Sequence[xr.Dataset], policy: Policy) -> Iterator[MeasuredTest]:
+        """Each with a draw of noise of its own; what is random is drawn in order."""
+        drawn, twice = [add_noise(record, sensors, rng) for record in records], sensors.drawn_twice()
+        return by_threads(lambda r: carrying(prepare_test(plant, r, twice, policy)), drawn, jobs)
 
-    tests = [carrying(prepare_test(plant, r, sensors, policy)) for r in records]
+    tests = list(by_threads(lambda r: carrying(prepare_test(plant, r, sensors, policy)), records, jobs))
     rougher = policy._replace(shares=False)
-    noisy = [noisier(record, rougher) for _ in range(int(n("fit.draws"))) for record in records]
+    noisy = [test for _ in range(int(n("fit.draws"))) for test in noisier(records, rougher)]
     exact = [not is_measured(record) for record in records]
     if any(exact):
         free = "simulated without noise; weights and intervals are those of the noise that sensors %s state"
         log.warning(f"%s: {free}", ", ".join(t.name for t, one in zip(tests, exact, strict=True) if one), sensors.name)
     # noise that a record does not have adds nothing to the normal equations, so nothing of it is subtracted
-    again = [
-        [test if one else noisier(r, policy) for r, test, one in zip(records, tests, exact, strict=True)]
-        for _ in range(int(n("fit.corrections")))
-    ]
+    some = [record for record, one in zip(records, exact, strict=True) if not one]
+    again = []
+    for _ in range(int(n("fit.corrections"))):
+        draw = noisier(some, policy)
+        again.append([test if one else next(draw) for test, one in zip(tests, exact, strict=True)])
     problem = Problem(
         *(machine, tests, noisy, sensors, comparison),
         again=again, jobs=jobs, kinds=kinds, others=others(machine), delays=removed,

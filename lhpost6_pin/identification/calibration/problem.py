@@ -13,6 +13,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from ...core.arrays import Array, Complex, Mask
+from ...core.threads import by_threads
 from ...data.sensors import SensorSet
 from ...machine.machine import Machine
 from ...machine.specimen import Specimen
@@ -23,6 +24,7 @@ from ..prepare import MeasuredTest
 from ..residual_change import Evaluated, change_of
 from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, kinds_shown
 from .bin_rows import SparseBins, sparse_bins
+from .derivative_steps import derivative_steps
 from .free_parameters import FreeParameter, parameter_changes
 from .operating_point import OperatingPoint
 from .parameters_of_tests import parameters_of_tests
@@ -54,26 +56,6 @@ class EvaluationGroup(NamedTuple):
 
     members: tuple[tuple[int, int], ...]  # place in x, and actuator or strut on whose rows it acts; -1: on all rows
     residuals: tuple[str, ...]  # kinds that depend on it
-
-
-def _steps(every: Sequence[FreeParameter | SensorUnknown], share: float) -> Array:
-    """Steps of the coordinates (p,) for derivatives: a share of each one's deviation, of delays the same time.
-
-    A one-sided difference of a shift in time is the derivative half a step later. Where residuals show only a sum of
-    delays, unequal steps would seem to tell its parts apart: a valve's delay is added, a sensor's removed.
-    """
-    steps = np.array([one.step or share * one.sd for one in every])
-    later = np.array([_later(one) for one in every])
-    if (late := later != 0.0).any():
-        steps[late] = np.abs(steps * later)[late].min() / later[late]
-    return steps
-
-
-def _later(one: FreeParameter | SensorUnknown) -> float:
-    """Time by which a channel comes later per unit of a coordinate; zero of what is no delay."""
-    if isinstance(one, SensorUnknown):
-        return -1.0 if one.kind == "delay" else 0.0
-    return one.slope(0.0) if one.name.endswith(".valve_delay") else 0.0
 
 
 class Problem:
@@ -116,7 +98,7 @@ class Problem:
         unknowns = sensor_unknowns(machine, sensors, tests[0])
         self.unknowns = tuple(u for u in unknowns if set(u.shows_in) & set(kinds))
         self.free: dict[str, float] = {}  # prior over stated deviation of the released unknowns
-        clean = [evaluate_residuals(plant, t, kinds) for t in tests]
+        clean = list(by_threads(lambda t: evaluate_residuals(plant, t, kinds), tests, jobs))
         self.scale = find_scale(machine, tests[0], clean[0])
         free = parameters_of_tests(machine, plant, tests)
         self._set(machine, without_held(free, self.scale))
@@ -132,7 +114,7 @@ class Problem:
                 more.append(evaluate_residuals(plant, replace(test, path=None), kinds))
             more += [evaluate_residuals(one, test, kinds) for one in instead]
             draws = len(found)
-            found += [self.bins(_less(one, base), test)[0] * np.sqrt(draws) for one in more]
+            found += [self.bins(one.less(base), test)[0] * np.sqrt(draws) for one in more]
             found[:] = [bins * np.sqrt((draws + len(more)) / draws) for bins in found]
         # where all friction acts along one axis or two, what its form leaves there is no noise of other kinds
         kinds_of = None if machine.motion == "free" else np.repeat(np.arange(len(self.widths)), self.widths)
@@ -146,7 +128,7 @@ class Problem:
         self.names = tuple(one.name for one in every)
         self.stated = np.array([one.sd for one in every])
         self.prior = self.stated * [self.free.get(name, 1.0) for name in self.names]
-        self.step = _steps(every, self.comparison.step)
+        self.step = derivative_steps(every, self.comparison.step)
         # (p,) in which residuals are not nearly linear: all but shifts of points in plan, gains and offsets
         self.bent = np.array([*(not k.mirrored for k in parameters), *(u.kind == "delay" for u in self.unknowns)])
         self.lowest, self.highest = np.array([(one.lowest, one.highest) for one in every]).reshape(-1, 2).T
@@ -202,15 +184,20 @@ class Problem:
     def noise_draws(self, x: Array) -> list[list[Complex]]:
         """Whitened bins (m, c) of every test by which each draw of noise changes its residuals, the unknowns at x."""
         plant = self.plant_at(x)
-        noise = self._noise(plant, [evaluate_residuals(plant, test, self.kinds) for test in self.tests])
+        clean = list(by_threads(lambda test: evaluate_residuals(plant, test, self.kinds), self.tests, self.jobs))
+        noise = self._noise(plant, clean)
         return [[self._whitened(t, bins) for bins in draws] for t, draws in enumerate(noise)]
 
     def _noise(self, plant: Plant, clean: Sequence[Residuals]) -> list[list[Complex]]:
         """Change of the bins (m, c) of every test with each draw of noise."""
         found: list[list[Complex]] = [[] for _ in clean]
-        for i, test in enumerate(self.noisy):
-            at = i % len(clean)
-            found[at].append(self.bins(_less(evaluate_residuals(plant, test, self.kinds), clean[at]), test)[0])
+
+        def of_one(i: int) -> Complex:
+            test = self.noisy[i]
+            return self.bins(evaluate_residuals(plant, test, self.kinds).less(clean[i % len(clean)]), test)[0]
+
+        for i, bins in enumerate(by_threads(of_one, range(len(self.noisy)), self.jobs)):
+            found[i % len(clean)].append(bins)
         return found
 
     def rows(self, kind: str, *places: int) -> Mask:
@@ -232,8 +219,11 @@ class Problem:
 
     def residual(self, base: OperatingPoint) -> list[Complex]:
         """Whitened bins (m, c) of every test at an operating point."""
-        pairs = zip(base.residuals, base.tests, strict=True)
-        return [self._whitened(i, self.bins(r, test)[0]) for i, (r, test) in enumerate(pairs)]
+
+        def of_one(i: int) -> Complex:
+            return self._whitened(i, self.bins(base.residuals[i], base.tests[i])[0])
+
+        return list(by_threads(of_one, range(len(self.tests)), self.jobs))
 
     def _whitened(self, test: int, bins: Complex) -> Complex:
         return self.whitened(test, bins[..., None])[..., 0]
@@ -343,8 +333,3 @@ class Problem:
         if names[place] in double:
             rows |= self.rows("flow", len(names) + double.index(names[place]))
         return rows
-
-
-def _less(after: Residuals, before: Residuals) -> Residuals:
-    """Change of residuals; no columns where `after` has none."""
-    return Residuals(*(a - b if a.shape[1] else a for a, b in zip(after, before, strict=True)))

@@ -9,9 +9,9 @@ __all__ = ["beside", "import_all"]
 
 
 def beside(function: Callable[..., object], *arguments: object) -> None:
-    """Start a function that prepares what is needed later in a thread that ends with the process.
+    """Start a function that prepares what is needed later, in a thread that ends with the process.
 
-    Its errors are passed over: who needs the same later does it again, and meets them.
+    Its errors are passed over: they are raised again where the same is needed.
     """
 
     def run() -> None:
@@ -22,6 +22,6 @@ def beside(function: Callable[..., object], *arguments: object) -> None:
 
 
 def import_all(*modules: str) -> None:
-    """Import modules by name. Who imports one of them meanwhile waits for it."""
+    """Import modules by name; an import of one of them elsewhere waits for this one."""
     for name in modules:
         import_module(name)

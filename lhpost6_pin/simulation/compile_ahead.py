@@ -57,7 +57,7 @@ def wait_for(compiling: "subprocess.Popen[bytes] | None") -> None:
 
 
 def load_ahead(engine: str) -> None:
-    """Start to load the step in a thread, if it has been compiled; whatever compiled code is needed first waits."""
+    """Start to load the step in a thread, if it has been compiled; other compiled code is loaded after it."""
     if _is_cached(engine):
         beside(compile_step, engine)
 

@@ -244,7 +244,7 @@ def test_run_names_a_folder_after_the_motion_and_replaces_its_own_results_with_a
         (("--specimen", PENDULUM, "--locked"), {"specimen": "pendulum"}),
         (("--specimen", PENDULUM, "--engine", "pinocchio"), {"specimen": "pendulum", "engine": "pinocchio"}),
         (("--controller", "lhpost6"), {"trouble": "none"}),
-        (("--low-pass", "10", "--high-pass", "0.05"), {"trouble": "none"}),
+        (("--low-pass", "10Hz", "--high-pass", "0.05"), {"trouble": "none"}),
     ],
 )
 def test_run_does_what_its_options_say(lhpost6, tmp_path, brief, options, attributes):

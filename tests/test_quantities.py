@@ -20,5 +20,19 @@ def test_a_text_that_is_no_such_number_is_refused(unit, text):
         quantity_option("--dt", unit, "10ms", "").parser(text)
 
 
+@pytest.mark.parametrize(
+    "option, text, example",
+    [
+        ("--high-pass", "2s", "0.2Hz"),
+        ("--low-pass", "25mm", "25Hz"),
+        ("--taper", "2Hz", "500ms"),
+        ("--cutoff", "1s", "33Hz"),
+    ],
+)
+def test_an_option_in_another_unit_is_refused_with_an_example(lhpost6, option, text, example):
+    command = ("decompose", "absent.nc") if option == "--cutoff" else ("run", "sine")
+    assert refused(lhpost6(*command, option, text), f"{option} {text}: write one number", f"as {example}")
+
+
 def test_a_run_says_how_a_scale_is_written(lhpost6):
     assert refused(lhpost6("run", "sine", "--scale", "half"), "--scale half", "as 50%")

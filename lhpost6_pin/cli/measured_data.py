@@ -9,6 +9,7 @@ import typer
 from ..core.errors import ParameterError, RecordError
 from . import options as opt
 from .app import command, print_result, progress_bar, repeating_command
+from .quantities import quantity_option
 
 if TYPE_CHECKING:
     from ..data.campaign import Campaign
@@ -139,7 +140,9 @@ def decompose(
     machine: opt.SpecimenOptions,
     out: opt.Out = None,
     sensors: opt.SensorsName = None,
-    cutoff: Annotated[float | None, typer.Option(help="Low-pass of all forces [Hz]; default: 33.")] = None,
+    cutoff: Annotated[
+        float | None, quantity_option("--cutoff", "Hz", "33Hz", r"Low-pass of all forces \[Hz]; default: 33.")
+    ] = None,
     no_align: Annotated[bool, typer.Option("--no-align", help="Do not correct skews between channels.")] = False,
     json: opt.Json = False,
 ) -> None:

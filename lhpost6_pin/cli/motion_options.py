@@ -29,8 +29,10 @@ __all__ = [
 ]
 __all__ += ["MotionOptions", "RotateBy", "SpectrumDamping", "Taper", "TimeScale", "is_file"]
 
-HighPass = Annotated[float | None, typer.Option(help="High-pass corner of the motion [Hz].")]
-LowPass = Annotated[float | None, typer.Option(help="Low-pass corner of the motion [Hz].")]
+HighPass = Annotated[
+    float | None, quantity_option("--high-pass", "Hz", "0.2Hz", r"High-pass corner of the motion \[Hz].")
+]
+LowPass = Annotated[float | None, quantity_option("--low-pass", "Hz", "25Hz", r"Low-pass corner of the motion \[Hz].")]
 
 TimeScale = Annotated[
     float | None,
@@ -44,7 +46,12 @@ TimeScale = Annotated[
 ]
 Taper = Annotated[
     float | None,
-    typer.Option(help=r"Taper at both ends of a displacement motion that does not begin and end at rest \[s]."),
+    quantity_option(
+        "--taper",
+        "s",
+        "500ms",
+        r"Taper at both ends of a displacement motion that does not begin and end at rest \[s].",
+    ),
 ]
 RotateBy = Annotated[
     float | None,
@@ -55,7 +62,8 @@ MatchSpectrum = Annotated[
     typer.Option(help="CSV of a response spectrum (period_s,sa_g) that the motion is adjusted to, at scale 1."),
 ]
 SpectrumDamping = Annotated[
-    float | None, typer.Option(help="Damping of that spectrum, as share of critical; default: 0.05.")
+    float | None,
+    quantity_option("--spectrum-damping", "1", "5%", "Damping of that spectrum, as share of critical; default: 0.05."),
 ]
 
 FileStep = Annotated[

@@ -9,16 +9,17 @@ __all__ = ["beside", "import_all"]
 
 
 def beside(function: Callable[..., object], *arguments: object) -> None:
-    """Start a function that prepares what is needed later, in a thread that ends with the process.
+    """Start a function that prepares what is needed later, in a thread.
 
-    Its errors are passed over: they are raised again where the same is needed.
+    Its errors are passed over: they are raised again where the same is needed. A process that ends waits for it: to end
+    a thread within the initialisation of a library aborts the process.
     """
 
     def run() -> None:
         with suppress(Exception):
             function(*arguments)
 
-    threading.Thread(target=run, name=function.__name__, daemon=True).start()
+    threading.Thread(target=run, name=function.__name__).start()
 
 
 def import_all(*modules: str) -> None:

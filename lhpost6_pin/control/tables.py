@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..core.arrays import Array
 from ..core.compiled import compiled_inline
-from ..core.packed import array_view, table_view
+from ..core.packed import array_view, packed_zeros, table_view
 from ..mechanics.plant import Plant
 from .filters import NOTCHES
 
@@ -101,11 +101,7 @@ def make_scratch(plant: Plant) -> Scratch:
     """Scratch sized for a plant."""
     ports, legs, n = len(plant.ports), plant.legs.size, plant.spools
     shapes = [(ports,), (ports, 6), (ports, 6), (legs, 6), (8, 3), (4,), (3,), (n,), (n,), (6,), (n,)]
-    ends = np.cumsum([_SIZES, *(int(np.prod(shape)) for shape in shapes)])
-    packed = np.zeros(ends[-1])
-    packed[:_SIZES] = ports, legs, n
-    views = (packed[a:b].reshape(shape) for a, b, shape in zip(ends[:-1], ends[1:], shapes, strict=True))
-    return Scratch(packed, *views)
+    return Scratch(*packed_zeros((ports, legs, n), shapes))
 
 
 @compiled_inline

@@ -1,16 +1,29 @@
-"""Views of an array in which others are packed one behind the other, within compiled code.
+"""Arrays packed one behind the other into one, and views of them within compiled code.
 
 The caller holds the packed array. Views have no owner: neither they nor those made of them count references, which are
 atomic operations and, for two dozen views a step, cost as much as the step's own arithmetic.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core.cgutils import unpack_tuple
 from numba.extending import intrinsic
 
-__all__ = ["array_view", "table_view"]
+from .arrays import Array
+
+__all__ = ["array_view", "packed_zeros", "table_view"]
+
+
+def packed_zeros(head: Sequence[int], shapes: Sequence[tuple[int, ...]]) -> list[Array]:
+    """One array of zeros behind the numbers of a head, then its parts of these shapes, as views."""
+    ends = np.cumsum([len(head), *(int(np.prod(shape)) for shape in shapes)])
+    packed = np.zeros(ends[-1])
+    packed[: len(head)] = head
+    views = zip(ends[:-1], ends[1:], shapes, strict=True)
+    return [packed, *(packed[first:last].reshape(shape) for first, last, shape in views)]
 
 
 @intrinsic

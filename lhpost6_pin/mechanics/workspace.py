@@ -2,11 +2,9 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
 from ..core.arrays import Array
 from ..core.compiled import compiled_inline
-from ..core.packed import array_view
+from ..core.packed import array_view, packed_zeros
 from ..effects.registry import PORTS
 from .plant import Plant, State
 from .schemes import V
@@ -40,11 +38,7 @@ def make_workspace(plant: Plant, start: State) -> Workspace:
     nq, nv, modes = plant.model.nq, plant.model.nv, plant.modes.size
     shapes = [(nq,), (states,), (states,), (7, nv), (4, n), (2, n, 6), (8, 3), (rows, len(PORTS)), (6,)]
     shapes.append((4, modes))
-    ends = np.cumsum([_HEAD, *(int(np.prod(shape)) for shape in shapes)])
-    buffer = np.zeros(ends[-1])
-    buffer[:_HEAD] = nq, states, nv, n, rows, modes
-    views = (buffer[a:b].reshape(shape) for a, b, shape in zip(ends[:-1], ends[1:], shapes, strict=True))
-    ws = Workspace(buffer, *views)
+    ws = Workspace(*packed_zeros((nq, states, nv, n, rows, modes), shapes))
     ws.q[:], ws.motion[V], ws.z[:] = start
     ws.external[:] = plant.rest_external
     return ws

@@ -45,7 +45,8 @@ def compile_ahead(engine: str) -> "subprocess.Popen[bytes] | None":
     """
     if cache_folder() is None or (os.cpu_count() or 1) < 2 or _is_cached(engine):
         return None
-    code = f"from {__name__} import compile_step; compile_step({engine!r})"
+    quick = f"from {collect_less.__module__} import collect_less; collect_less()"
+    code = f"{quick}; from {__name__} import compile_step; compile_step({engine!r})"
     return subprocess.Popen([sys.executable, "-P", "-c", code], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
@@ -64,6 +65,5 @@ def load_ahead(engine: str) -> None:
 
 def compile_step(engine: str) -> None:
     """Compile the step into the cache, or load it from there."""
-    collect_less()
     for function, signature in SIGNATURES[engine].items():
         function.compile(signature)

@@ -119,16 +119,17 @@ class NormalEquations:
 
     def correction(self, tests: Sequence[int], columns: Mask | None = None) -> tuple[Array, Array]:
         """Contributions of noise to matrix (p, p) and right side (p,), which `of` subtracts; zero if not corrected."""
-        bias = self.bias
-        rows = [] if bias is None else bias.rows
+        if self.bias is None:
+            count = len(self.slope[0])
+            return np.zeros((count, count)), np.zeros(count)
+        both = list(zip(self.bias.rows, self.bias.residual, strict=True))  # by replica
 
         def of_one(t: int) -> tuple[Array, Array]:
-            both = [(own[t], rest[t]) for own, rest in zip(rows, bias.residual if bias else [], strict=True)]
-            matrix = sum(own.squares(np.sqrt(self.power[t]), columns) for own, _ in both) / len(both)
-            right = sum(_dot(own, rest, self.power[t], columns) for own, rest in both) / len(both)
+            matrix = sum(rows[t].squares(np.sqrt(self.power[t]), columns) for rows, _ in both) / len(both)
+            right = sum(_dot(rows[t], rest[t], self.power[t], columns) for rows, rest in both) / len(both)
             return np.asarray(matrix), np.asarray(right)
 
-        return self._summed(of_one, tests if rows else ())
+        return self._summed(of_one, tests)
 
     @cached_property
     def whole(self) -> tuple[Array, Array]:

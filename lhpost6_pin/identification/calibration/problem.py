@@ -98,7 +98,7 @@ class Problem:
         unknowns = sensor_unknowns(machine, sensors, tests[0])
         self.unknowns = tuple(u for u in unknowns if set(u.shows_in) & set(kinds))
         self.free: dict[str, float] = {}  # prior over stated deviation of the released unknowns
-        clean = list(by_threads(lambda t: evaluate_residuals(plant, t, kinds), tests, jobs))
+        clean = self._clean(plant)
         self.scale = find_scale(machine, tests[0], clean[0])
         free = parameters_of_tests(machine, plant, tests)
         self._set(machine, without_held(free, self.scale))
@@ -184,9 +184,12 @@ class Problem:
     def noise_draws(self, x: Array) -> list[list[Complex]]:
         """Whitened bins (m, c) of every test by which each draw of noise changes its residuals, the unknowns at x."""
         plant = self.plant_at(x)
-        clean = list(by_threads(lambda test: evaluate_residuals(plant, test, self.kinds), self.tests, self.jobs))
-        noise = self._noise(plant, clean)
+        noise = self._noise(plant, self._clean(plant))
         return [[self._whitened(t, bins) for bins in draws] for t, draws in enumerate(noise)]
+
+    def _clean(self, plant: Plant) -> list[Residuals]:
+        """Residuals of every test without more noise."""
+        return list(by_threads(lambda test: evaluate_residuals(plant, test, self.kinds), self.tests, self.jobs))
 
     def _noise(self, plant: Plant, clean: Sequence[Residuals]) -> list[list[Complex]]:
         """Change of the bins (m, c) of every test with each draw of noise."""

@@ -197,6 +197,18 @@ def test_bold_parameters_are_three_deviations_off_and_others_within_the_clip():
     assert twins["component.H1"]["platen_point"][0] == -twins["component.H4"]["platen_point"][0]
 
 
+def test_no_wrong_parameter_makes_up_for_an_effect_that_acts_as_it_does():
+    """Pads that rub twice as much as wrong numbers say, half of the stated ones, rub as stated: nothing is missing."""
+    rule = cases.model()["kind.vertical"]["pad_friction"]
+    for seed in range(20):
+        case = cases.draw_case("one", ("bearing_friction",), seed=seed)
+        (effect,) = case.effects
+        pads = case.values["kind.vertical"]["pad_friction"]
+        whole = pads * (1.0 + effect.fields["pad_extra"]) / rule["value"] - 1.0
+        assert pads >= rule["value"] and case.label["parameters_sd"]["kind.vertical.pad_friction"] >= 0.0
+        assert len(effect.components) == 1 or whole > 3.4 * rule["rel_sd"]  # beyond what a calibration may change
+
+
 def test_a_delayed_channel_shows_late_and_a_gain_shows_as_a_gain():
     time = np.arange(8192) / simulate.RATE
     wave = np.sin(2 * np.pi * 2 * time)[:, None]

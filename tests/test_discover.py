@@ -388,6 +388,11 @@ def test_families_confused_with_a_rival_contest_on_its_components_though_refused
     ]
     search = replace(found.search, added=(), rounds=(Round((*refused, *rivals)),))
     assert _with_confused(search, rivals) == [refused[0], *rivals]
+    # of second order in its numbers: to first order a mass far off the centre gains a hundredth of its products
+    inertia, mass = scored("inertia_coupling", ("platen",), 400.0), scored("added_mass", ("platen",), 4.0)
+    search = replace(search, rounds=(Round((inertia, mass, *rivals)),))
+    assert _with_confused(search, [inertia, *rivals]) == [inertia, *rivals, mass]
+    assert _with_confused(search, rivals) == rivals
 
 
 def test_where_the_residual_is_large_a_family_contests_on_more_components_though_refused(found):
@@ -912,6 +917,18 @@ def test_no_strength_that_leaves_the_platen_no_inertia_is_fitted(found):
     assert not _best_strength(found.search, one, high, (1.0,), afresh=False).any()
     small = _best_strength(found.search, one, high, (1.0, 1e-6), afresh=False)
     np.testing.assert_array_equal(small, 1e-6 * high)
+    mass = candidate("added_mass", "platen")  # products jump at zero, which is no start
+    far = np.array([-1.0, 1e6, 1e6, 1e6])
+    typical = [shape.typical for shape in mass.amplitudes]
+    np.testing.assert_array_equal(_best_strength(found.search, mass, far, (1.0,), afresh=False), typical)
+
+
+def test_a_candidate_without_derivatives_is_not_fitted(found, monkeypatch):
+    def no_machine(*given, **options):
+        raise ParameterError("leaves the platen no inertia")
+
+    monkeypatch.setattr(Search, "solved", no_machine)
+    assert fit_jointly(found.search, scored("added_mass", ("platen",), 30.0), lambda share: None).search is found.search
 
 
 def test_a_step_to_a_machine_without_inertia_is_rejected(found, monkeypatch):

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.arrays import Array
+from ..core.errors import ParameterError
 from ..core.progress import Progress, split
 from ..identification.calibration.fit import objective_at
 from ..identification.calibration.free_parameters import FreeParameter
@@ -95,7 +96,8 @@ def fit_from_rival(found: Search, one: Scored, rival: Scored, fitted: Search, pr
 def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool, reused: bool = True) -> Search:
     """The search with a candidate fitted jointly, from the present solution or from the stated parameters (`afresh`).
 
-    Derivatives by everything else are `reused`: mostly accurate enough to compare candidates.
+    Derivatives by everything else are `reused`: mostly accurate enough to compare candidates. The search as it is where
+    a fit comes so near to numbers that make no machine that it has no derivatives.
     """
     problem, candidate, start = found.problem, one.candidate, found.solution.at
     if candidate.release:
@@ -110,7 +112,10 @@ def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool, r
     # derivatives that change much with an effect: for one of the oil, those by numbers of oil and valves
     flows = [*(k.shows_in == ("flow",) for k in problem.parameters), *(u.alone[1] >= 0 for u in problem.unknowns)]
     near = np.array(flows) & ("flow" in candidate.family.shows_in)
-    return found.solved(problem, np.zeros_like(start) if afresh else start, progress, settled=reused, near=near)
+    try:
+        return found.solved(problem, np.zeros_like(start) if afresh else start, progress, settled=reused, near=near)
+    except ParameterError:  # a step for a derivative leaves no machine
+        return found
 
 
 def _best_strength(
@@ -118,10 +123,11 @@ def _best_strength(
 ) -> Array:
     """The linear estimate (q,) of a candidate's amplitudes, times the factor of some with which it explains most.
 
-    Far from the optimum the linear estimate may be several times too small or too large. Zero where none of them makes
-    a machine.
+    Far from the optimum the linear estimate may be several times too small or too large. Where none of them makes a
+    machine, zero; typical sizes where residuals are not linear in the amplitudes.
     """
-    start, best, least = found.solution.at, np.zeros_like(amplitude), np.inf
+    start, least = found.solution.at, np.inf
+    best = np.zeros_like(amplitude) if candidate.family.linear else np.array([s.typical for s in candidate.amplitudes])
     for factor in strengths:
         tried = np.clip(factor * amplitude, *candidate.bounds)
         problem, x = with_candidate(found.problem, candidate, tuple(tried.tolist()), (), start)

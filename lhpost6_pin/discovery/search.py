@@ -219,11 +219,12 @@ def _share_explained(found: Search, more: Search) -> float:
 def _in_its_place(found: Search, one: Scored, *, confused: bool = False) -> list[Scored]:
     """The best candidates of other families on the same components with nearly the same gain, not added yet.
 
-    Or, of families confused with its own, with a good part of that gain.
+    Or, of families confused with its own, with a good part of that gain, or not linear in their amplitudes.
     """
     near = found.numbers.number("accept.confused" if confused else "accept.near") * one.gain
     taken = {one.candidate.family.name, *(a.candidate.family.name for a in found.added)}
-    some = [o for o in found.rounds[-1].scored if o.gain >= near and not o.candidate.release]
+    known = [o for o in found.rounds[-1].scored if not o.candidate.release]
+    some = [o for o in known if o.gain >= near or (confused and not o.candidate.family.linear)]
     if confused:
         some = [o for o in some if o.candidate.family.named in one.candidate.family.confused_with]
     there = best_per_family([o for o in some if o.candidate.components == one.candidate.components])
@@ -260,13 +261,15 @@ def _with_confused(found: Search, rivals: Sequence[Scored]) -> list[Scored]:
     """Candidates, and those confused with one of them that gain a good part on its components; by falling gain.
 
     Of two that explain alike, one may be refused by a hair, or its family be there on other components: joint fits
-    decide, of fewer than twice as many candidates.
+    decide, of fewer than twice as many candidates. And of those whose residuals are not linear in their amplitudes,
+    whatever they gain to first order: a mass off the centre shows by its products of inertia, which are of second.
     """
     every = list(rivals)
     for one in rivals:
         every += [other for other in _in_its_place(found, one, confused=True) if other not in every]
-    most = 2 * int(found.numbers.number("accept.rivals")) - 1
-    return sorted(every, key=lambda one: -one.gain)[: max(most, len(rivals))]
+    most = max(2 * int(found.numbers.number("accept.rivals")) - 1, len(rivals))
+    ranked = enumerate(sorted(every, key=lambda one: -one.gain))
+    return [one for i, one in ranked if i < most or not one.candidate.family.linear]
 
 
 def _on_more_components(found: Search, rivals: Sequence[Scored]) -> list[Scored]:

@@ -138,6 +138,8 @@ def draw_case(
     elif sort != "null":
         library = numbers()["unknown" if sort == "unknown" else "effect"]
         effects = [draw_effect(family, library[family], sizes, random, strength, variant) for family in families]
+        for effect in effects if sort != "unknown" else ():
+            values, moved = _alike(effect, table, values, moved)
     described = [_describe(effect) for effect in effects]
     verdict, accept = VERDICTS[sort]
     name = random.bytes(5).hex()
@@ -232,6 +234,20 @@ def draw_parameters(model: Model, random: np.random.Generator, bold: bool) -> tu
     for name in KIND_LEGS["vertical"]:  # the bearings lie in the sliding plane
         values[f"component.{name}"]["platen_point"][2] = plane
     return values, moved
+
+
+def _alike(
+    effect: Effect, model: Model, values: dict[str, dict], moved: dict[str, float]
+) -> tuple[dict[str, dict], dict[str, float]]:
+    """Parameters with the one that an effect adds `with`, if any, off in the direction of that effect."""
+    (name,) = {variant.get("with") for variant in numbers()["effect"][effect.family]}
+    if name is None:
+        return values, moved
+    table, key = name.rsplit(".", 1)
+    way = float(np.sign(next(iter(effect.fields.values()))))
+    stated, step = model[table][key]["value"], way * abs(moved[name])
+    value = stated + step * _deviation(model[table][key])
+    return {**values, table: {**values[table], key: value}}, {**moved, name: step}
 
 
 def _deviation(entry: object) -> np.ndarray | float | None:

@@ -193,6 +193,8 @@ def _family(family: Family, machine: Machine) -> str:
         facts.append(("in a search", "never a candidate: the form of an unexplained residual"))
     if family.confusable:
         facts.append(("in a search", "needs more gain: confusable with another form of a law of the report"))
+    if not family.linear:
+        facts.append(("in a search", "always fitted beside what it is confused with: not linear in its amplitudes"))
     if family.elastic:
         facts.append(("in a search", "may leave less of the residual than others: a spring has no other form"))
     parts.append(table(("", ""), facts))

@@ -53,6 +53,7 @@ class Family:
     # in every search and never named; "unnamed": never a candidate
     search: str
     confusable: bool  # whether another form of the report's own laws may pass for it
+    linear: bool  # whether residuals are in its amplitudes; if not, those of small ones do not show what large ones do
     elastic: bool  # whether it is a spring, alone or with a linear damper: what it leaves is no other form of it
     kind: str  # what families that are hard to tell apart have in common, in words; empty: none
     over: str  # state that it depends on, for figures; empty: time
@@ -147,6 +148,7 @@ def _family(name: str, table: dict[str, Any], file: str) -> Family:
         sum_with=table.get("sum_with", ""),
         search=table.get("search", "named"),
         confusable=table.get("confusable", False),
+        linear=table.get("linear", True),
         elastic=table.get("elastic", False),
         kind=table.get("kind", ""),
         over=table.get("over", ""),

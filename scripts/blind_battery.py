@@ -10,7 +10,8 @@ size, valves, oil and friction than the LHPOST6; --fewer leaves out a third of t
 campaign that lacks nothing got a name, or too few a right one: a smoke test, which `scripts/checks.py` runs.
 --baselines adds what correlation and a bagged sparse regression (pysindy) name on the first 60 cases. --dask runs the
 cases on a Dask cluster, at an address or `local`, in place of processes. --publish writes the
-scores to scripts/battery/results.md, too; of batteries of another variety to results_anew.md and the like.
+scores to scripts/battery/results.md, too, with a figure beside it; of batteries of another variety to results_anew.md
+and the like. It needs `pip install '.[docs]'`.
 """
 
 import argparse
@@ -18,6 +19,7 @@ import json
 import sys
 import tomllib
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
 from battery.cases import Case, Variety, model
@@ -25,7 +27,7 @@ from battery.generate import draw_cases, seal, unseal, write_case
 from battery.machines import changed_values
 from battery.reach import measured_label
 from battery.reporting import answers, publish, report, search, wrong
-from battery.scoring import score
+from battery.scoring import reliability, score, strength_curve
 
 from lhpost6_pin.core.files import write_whole
 from lhpost6_pin.data.campaign import load_campaign
@@ -45,6 +47,12 @@ RESULTS = Path(__file__).parent / "battery"
 
 COMPARED = 60
 """Cases on which the simpler methods are tried, too: they take a fifth of the time, and err in nearly all."""
+
+FIGURE = (
+    "Share of hidden effects that were named, by their gap over sensor noise, and share of names that were right, by "
+    "their stated probability, with 95 % Wilson intervals"
+)
+"""What the figure beside the scores shows."""
 
 LEAST = 0.4
 """Share of right names below which something is broken; brief campaigns do not show all that is hidden."""
@@ -109,6 +117,13 @@ def refuse_other_draw(folder: Path, draw: str) -> None:
     path.write_text(draw, encoding="utf-8")
 
 
+def _draw(pairs: list[tuple[dict, dict]], path: Path) -> None:
+    """Draw the strength curve and the reliability of names."""
+    from battery.curves import draw_curves
+
+    draw_curves(strength_curve(pairs), reliability(pairs), path)
+
+
 def main() -> None:
     """Draw, seal, search, unseal, score."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
@@ -124,6 +139,8 @@ def main() -> None:
     parser.add_argument("--dask")
     parser.add_argument("--publish", action="store_true")
     asked = parser.parse_args()
+    if asked.publish and find_spec("matplotlib") is None:
+        sys.exit("--publish draws a figure: pip install '.[docs]' first")
     folder = asked.out
     folder.mkdir(parents=True, exist_ok=True)
     refuse_other_draw(folder, drawn_by(asked))
@@ -145,7 +162,9 @@ def main() -> None:
     if asked.publish:
         command = f"python scripts/blind_battery.py {drawn_by(asked)}{' --baselines' if asked.baselines else ''}"
         words = [option for option in ("anew", "fewer") if getattr(asked, option)]
-        publish(text, RESULTS / f"{'_'.join(['results', *words])}.md", "Scores of the blind battery", command)
+        page = RESULTS / f"{'_'.join(['results', *words])}.md"
+        _draw(list(answered.values()), page.with_suffix(".svg"))
+        publish(text, page, "Scores of the blind battery", command, FIGURE)
     if asked.check and (why := wrong(labels, answered, "family first", LEAST)):
         sys.exit(why)
 

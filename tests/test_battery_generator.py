@@ -6,7 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from battery import cases, generate, hidden, machines, motions, rates, reach, scoring, sensors, simulate, table
+from battery import (
+    cases,
+    generate,
+    hidden,
+    machines,
+    motions,
+    rates,
+    reach,
+    reporting,
+    scoring,
+    sensors,
+    simulate,
+    table,
+)
 from blind_battery import refuse_other_draw
 
 from lhpost6_pin.data.records import load_record
@@ -382,6 +395,24 @@ def test_stated_probabilities_are_held_against_what_was_right():
     right["effects"][0]["probability"], wrong["effects"][0]["probability"] = 0.95, 0.6
     label = labelled("one", "named", ("backlash", 3.0))
     assert scoring.reliability([(label, right), (label, wrong)]) == {"0.5 to 0.7": (0, 1), "0.9 to 0.99": (1, 1)}
+
+
+def test_the_figure_of_a_battery_comes_first_and_is_the_same_however_often_it_is_drawn(tmp_path):
+    pytest.importorskip("matplotlib")
+    from battery.curves import draw_curves
+
+    strength, names = (
+        {"1 to 2": scoring.Share(0, 0), "above 100": scoring.Share(8, 9)},
+        {"0.5 to 0.7": scoring.Share(3, 5)},
+    )
+    draw_curves(strength, names, tmp_path / "scores.svg")
+    drawn = (tmp_path / "scores.svg").read_bytes()
+    draw_curves(strength, names, tmp_path / "scores.svg")
+    assert (tmp_path / "scores.svg").read_bytes() == drawn
+    draw_curves(strength, {"0.5 to 0.7": scoring.Share(4, 5)}, tmp_path / "others.svg")
+    assert (tmp_path / "others.svg").read_bytes() != drawn
+    reporting.publish("| metric |", tmp_path / "scores.md", "Scores", "command", "What it shows")
+    assert (tmp_path / "scores.md").read_text().splitlines()[2] == "![What it shows](scores.svg)"
 
 
 def test_a_miss_is_listed_with_the_reason_of_the_last_round():

@@ -67,11 +67,13 @@ def test_differences_sums_and_neighbours(bins, rng):
     np.testing.assert_allclose(out.T, changed[..., 0] - bins[..., 0], atol=1e-15)
 
 
-def test_products_are_weighed_by_a_power(bins, rng):
-    power = 1.0 + rng.random((M, C))
+def test_products_are_weighed_by_a_power_that_is_constant_in_a_band(bins, rng):
+    starts = np.array([0, 1, 7])  # the mean alone, then bands of six and five bins
+    by_band = 1.0 + rng.random((len(starts), C))
+    power = np.repeat(by_band, np.diff([*starts, M]), axis=0)
     full = real(bins, np.sqrt(power))
-    rows = dense_rows(bins)
-    np.testing.assert_allclose(rows.squares(np.sqrt(power)), full.T @ full, atol=1e-12)
+    squares = dense_rows(bins).squares_by_band(starts)
+    np.testing.assert_allclose(squares.over(by_band), full.T @ full, atol=1e-12)
     some = np.arange(C) % 2 == 0
     part = real(bins[:, some], np.sqrt(power[:, some]))
-    np.testing.assert_allclose(rows.squares(np.sqrt(power), some), part.T @ part, atol=1e-12)
+    np.testing.assert_allclose(squares.over(by_band, some), part.T @ part, atol=1e-12)

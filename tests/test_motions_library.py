@@ -144,6 +144,19 @@ def test_a_quantity_of_another_kind_is_refused_with_the_unit_to_give(name, optio
         find_motion(name, **{option: written})
 
 
+@pytest.mark.parametrize(
+    ("name", "option", "written"),
+    [("ac156", "sds", "0.5"), ("white-noise", "rms", "1"), ("sfu-like", "peak_acceleration", "0.1, 0.1, 0.2")],
+)
+def test_an_acceleration_that_codes_state_in_g_needs_its_unit(name, option, written):
+    """Read as m/s2, a tenth of what was meant would be shaken."""
+    with pytest.raises(MotionError, match=f"^{name}: option {option} is '{written}', in no unit; give {written}g, or"):
+        find_motion(name, **{option: written})
+    stated, plain = find_motion(name, **{option: f"{written}g"}), [GRAVITY * float(x) for x in written.split(",")]
+    same = find_motion(name, **{option: plain if len(plain) > 1 else plain[0]})
+    np.testing.assert_allclose(stated.samples, same.samples, rtol=1e-12)  # the rounding of a product
+
+
 def test_each_option_has_a_default_in_si_with_unit_and_source():
     for entry in list_motions():
         options = motion_options(entry.name)

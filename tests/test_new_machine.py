@@ -78,6 +78,7 @@ def test_a_number_that_cannot_be_read_is_refused_with_its_name(text, words):
     [
         ({"mass": None}, "--mass is missing"),
         ({"area": None}, "--area is missing.* or --bore and --rod"),
+        ({"mass": None, "area": None}, "--mass is missing: .*; --area is missing"),  # all at once
         ({"mass": "-3 kg"}, "must be positive"),
         ({"size": "3 m"}, r"should be 2 number.*, as in '2 3 m'"),
         ({"size": "2 m, 3 ft"}, r"more than one unit; .*, as in '2 3 m'"),

@@ -14,7 +14,7 @@ from ..core.optional import INSTALL
 from .ac156 import ac156
 from .csv import load_csv
 from .motion import AXES, GroundMotion
-from .motion_options import MotionOption, checked_options, options_of
+from .motion_options import MotionOption, checked_options, options_of, refuse_without_unit
 from .pulse_records import load_pulse_record, missing_package
 from .readers import MotionFiles, load_motion
 from .synthetic import sine, six_axial, triangle, white_noise
@@ -135,9 +135,9 @@ def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> Ground
     """Ground motion by name or alias, as `list_motions` shows them.
 
     `options` replace numbers of a test made by name, in SI or as text with a unit, as in
-    ``find_motion("ac156", sds="0.5 g", seed=2)``; `motion_options` lists them. A test whose record is not shipped is
-    read from the user's `files`, as in ``find_motion("tabas", ["x.AT2", "y.AT2", "z.AT2"])``; files and options are
-    then those of `load_motion`.
+    ``find_motion("ac156", sds="0.5 g", seed=2)``; accelerations as text need one. `motion_options` lists them. A test
+    whose record is not shipped is read from the user's `files`, as in
+    ``find_motion("tabas", ["x.AT2", "y.AT2", "z.AT2"])``; files and options are then those of `load_motion`.
 
     Raises UnknownNameError for a name that does not exist, MotionError for an option the motion does not
     take, a value that it cannot have (named), numbers that do not go together, files that cannot be read or are
@@ -166,6 +166,7 @@ def find_motion(name: str, files: MotionFiles = (), /, **options: Any) -> Ground
     units = {option.name: option.unit for option in options_of(tests, entry.name)} if options else {}
     if options.get("axis", numbers.get("axis")) in AXES[3:]:
         units = {key: _ROTATED.get(unit, unit) for key, unit in units.items()}
+    refuse_without_unit(name, tests[entry.name], options)
     chosen = checked_options(name, numbers, units, options)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # GroundMotion refuses what becomes infinite

@@ -11,7 +11,7 @@ from ..core.units import numbers_in
 from .motion import AXES
 from .toml import si_unit, values_of
 
-__all__ = ["MotionOption", "checked_options", "options_of"]
+__all__ = ["MotionOption", "checked_options", "options_of", "refuse_without_unit"]
 
 _MAY_BE_ZERO = ("height_ratio", "seed")
 _WHOLE = ("seed",)
@@ -34,6 +34,17 @@ def options_of(tests: dict[str, Any], section: str) -> tuple[MotionOption, ...]:
         for key, entry in tests[section].items()
         if isinstance(entry, dict)
     )
+
+
+def refuse_without_unit(name: str, section: Mapping[str, Any], options: Mapping[str, Any]) -> None:
+    """Raise MotionError for an acceleration as text without its unit, where the `section` of the tests states it in g.
+
+    Codes and laboratories state it so, all else here is in SI: a factor of ten between them would go unseen.
+    """
+    for key, value in options.items():
+        of_g = isinstance(section[key], dict) and section[key]["unit"] == "standard_gravity"
+        if of_g and isinstance(value, str) and all(0.0 < _number(item) < math.inf for item in value.split(",")):
+            raise MotionError(f"{name}: option {key} is {value!r}, in no unit; give {value}g, or {value}m/s2")
 
 
 def checked_options(

@@ -117,9 +117,13 @@ def wrong(labels: Mapping[str, Label], answered: Mapping[str, tuple[Label, Answe
     return f"too few right names: {first.text}" if first.hits < least * first.of else ""
 
 
-def publish(text: str, path: Path, title: str, command: str) -> None:
-    """Write scores to a page of the documentation's, with the command that gave them, the version and the day."""
+def publish(text: str, path: Path, title: str, command: str, figure: str = "") -> None:
+    """Write scores to a page of the documentation's, with the command that gave them, the version and the day.
+
+    figure says what the picture beside the page shows, which comes first; empty without one.
+    """
     today = datetime.now(UTC).date().isoformat()
     how = f"`{command} --publish`, version {__version__}, {today}. Shares with 95 % Wilson intervals."
     with write_whole(path) as beside:
-        beside.write_text(f"# {title}\n\n{how}\n\n{text}", encoding="utf-8")
+        picture = f"![{figure}]({path.stem}.svg)\n\n" if figure else ""
+        beside.write_text(f"# {title}\n\n{picture}{how}\n\n{text}", encoding="utf-8")

@@ -30,6 +30,8 @@ def assemble(folder: Path) -> None:
     for name in ("mkdocs.yml", "docstrings.py"):
         shutil.copy(HERE / name, folder / name)
     shutil.copytree(PAGES, folder / "pages")
+    for path in (ROOT / "scripts" / "battery").glob("*.svg"):
+        shutil.copy(path, folder / "pages" / "results")
     for path in sorted((folder / "pages").rglob("*.md")):
         depth = len(path.relative_to(folder / "pages").parts) - 1
         text = _INSERT.sub(lambda found: _generated(found.group(1)), path.read_text(encoding="utf-8"))

@@ -6,6 +6,7 @@ are summed column by column over the unknowns that show there, at a part of the 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from ...core.arrays import Array, Complex, Mask
 from ...core.compiled import compiled
 
 __all__ = [
+    "BandSquares",
     "BinRows",
     "SparseBins",
     "bin_rows",
@@ -69,15 +71,17 @@ class BinRows:
         """The same with every quantity scaled (p,)."""
         return BinRows(self.count, [(own, rows * scale[own, None]) for own, rows in self.parts])
 
-    def squares(self, root: Array | None = None, columns: Mask | None = None) -> Array:
-        """Products (p, p) of all rows with each other, over roots of a power (m, c), of some columns (c,) or all."""
+    def squares(self) -> Array:
+        """Products (p, p) of all rows with each other."""
         out = np.zeros((self.count, self.count))
-        weight = None if root is None else over(root)
-        for c, (own, rows) in enumerate(self.parts):
-            if len(own) and (columns is None or columns[c]):
-                weighed = rows if weight is None else rows * weight[c]
-                _add_at(out, own, weighed @ weighed.T)
+        for own, rows in self.parts:
+            if len(own):
+                _add_at(out, own, rows @ rows.T)
         return out
+
+    def squares_by_band(self, starts: NDArray[np.intp]) -> "BandSquares":
+        """The same by column and band of bins, each from one of `starts` (b,) to the next."""
+        return BandSquares(self.count, [(own, _products_by_band(rows, starts)) for own, rows in self.parts])
 
     def products(self, other: "BinRows") -> Array:
         """Products (p, q) with other rows of the same columns."""
@@ -113,6 +117,31 @@ class BinRows:
     def less(self, other: "BinRows") -> "BinRows":
         """Differences to as many other rows."""
         return BinRows(self.count, [_less(*both) for both in zip(self.parts, other.parts, strict=True)])
+
+
+@dataclass(frozen=True)
+class BandSquares:
+    """Products of p rows with each other, by column and band: summed over any power that is constant in a band."""
+
+    count: int  # p
+    parts: Sequence[tuple[NDArray[np.intp], Array]]  # by column: quantities (a,), and their products (b, a, a)
+
+    def over(self, power: Array, columns: Mask | None = None) -> Array:
+        """Sums (p, p) over a power (b, c), of some columns (c,) or all."""
+        out, weight = np.zeros((self.count, self.count)), 1.0 / power
+        for c, (own, products) in enumerate(self.parts):
+            if len(own) and (columns is None or columns[c]):
+                _add_at(out, own, np.tensordot(weight[:, c], products, axes=1))
+        return out
+
+
+def _products_by_band(rows: Array, starts: NDArray[np.intp]) -> Array:
+    """Products (b, a, a) of rows (a, 2 m) with each other in every band of bins."""
+    m, out = rows.shape[1] // 2, np.empty((len(starts), len(rows), len(rows)))
+    for b, (low, high) in enumerate(pairwise((*starts, m))):
+        real, imaginary = rows[:, low:high], rows[:, m + low : m + high]
+        out[b] = real @ real.T + imaginary @ imaginary.T
+    return out
 
 
 @compiled

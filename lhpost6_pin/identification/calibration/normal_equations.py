@@ -10,7 +10,7 @@ from ...core.arrays import Array, Complex, Mask
 from ...core.progress import Progress
 from ...core.threads import by_threads
 from ...machine.parameters import Parameters
-from .bin_rows import BinRows, SparseBins, bin_rows, row_by_column
+from .bin_rows import BandSquares, BinRows, SparseBins, bin_rows, row_by_column
 from .operating_point import OperatingPoint
 from .problem import Problem, Slopes
 from .whitened_residuals import excess
@@ -43,12 +43,12 @@ class NormalEquations:
         self.power = [np.ones(r.shape) for r in self.residual]
         self.bias: NoiseBias | None = None
         if known is not None and not fresh.any() and "rows" in vars(known) and len(known.slope[0]) == len(fresh):
-            self.rows = known.rows
+            self.rows, self.squares = known.rows, known.squares
 
     def _copied(self) -> "NormalEquations":
         """A copy without the sums, which another problem or scale has its own of."""
         other = copy(self)
-        for name in ("whole", "rows"):
+        for name in ("whole", "rows", "squares"):
             vars(other).pop(name, None)
         return other
 
@@ -85,24 +85,35 @@ class NormalEquations:
         """Rows of the derivatives of every test."""
         return _rows(self.problem, self.slope, self.residual)
 
+    @cached_property
+    def squares(self) -> list[BandSquares]:
+        """Products of these rows with each other, of every test."""
+        return _squares(self.problem, self.rows)
+
     def released(self) -> "NormalEquations":
         """Itself, without what is kept to sum it again at once, which fills memory."""
         for one in (self, self.bias):
-            if one is not None:
-                vars(one).pop("rows", None)
+            for name in ("rows", "squares") if one is not None else ():
+                vars(one).pop(name, None)
         return self
 
     def of(self, tests: Sequence[int], columns: Mask | None = None) -> tuple[Array, Array]:
         """Matrix (p, p) and right side (p,) of some tests and columns (c,), by default all."""
-        rows = self.rows
+        rows, squares, power = self.rows, self.squares, self._power_by_band
 
         def of_one(t: int) -> tuple[Array, Array]:
-            matrix = rows[t].squares(np.sqrt(self.power[t]), columns)
+            matrix = squares[t].over(power[t], columns)
             return matrix, _dot(rows[t], self.residual[t], self.power[t], columns)
 
         matrix, right = self._summed(of_one, tests)
         more, side = self.correction(tests, columns)
         return matrix - more, right - side
+
+    @property
+    def _power_by_band(self) -> list[Array]:
+        """Power (b, c) of every test, which is constant in a band."""
+        problem = self.problem
+        return [p[problem.whitener.starts(f)] for p, f in zip(self.power, problem.frequency, strict=True)]
 
     def _summed(self, function: Callable[[int], tuple[Array, Array]], tests: Sequence[int]) -> tuple[Array, Array]:
         """Sums, in the order of the tests, of the matrix (p, p) and right side (p,) that a function gives for each."""
@@ -122,11 +133,12 @@ class NormalEquations:
         if self.bias is None:
             count = len(self.slope[0])
             return np.zeros((count, count)), np.zeros(count)
-        both = list(zip(self.bias.rows, self.bias.residual, strict=True))  # by replica
+        each = list(zip(self.bias.rows, self.bias.squares, self.bias.residual, strict=True))  # by replica
+        power = self._power_by_band
 
         def of_one(t: int) -> tuple[Array, Array]:
-            matrix = sum(rows[t].squares(np.sqrt(self.power[t]), columns) for rows, _ in both) / len(both)
-            right = sum(_dot(rows[t], rest[t], self.power[t], columns) for rows, rest in both) / len(both)
+            matrix = sum(squares[t].over(power[t], columns) for _, squares, _ in each) / len(each)
+            right = sum(_dot(rows[t], rest[t], self.power[t], columns) for rows, _, rest in each) / len(each)
             return np.asarray(matrix), np.asarray(right)
 
         return self._summed(of_one, tests)
@@ -175,7 +187,8 @@ class NoiseBias:
         other.slope = [
             [[j.times(s) for j in slopes] for slopes, s in zip(slope, times, strict=True)] for slope in self.slope
         ]
-        vars(other).pop("rows", None)
+        for name in ("rows", "squares"):
+            vars(other).pop(name, None)
         return other
 
     @cached_property
@@ -184,11 +197,22 @@ class NoiseBias:
         pairs = zip(self.slope, self.residual, strict=True)
         return [_rows(self.problem, slope, rest) for slope, rest in pairs]
 
+    @cached_property
+    def squares(self) -> list[list[BandSquares]]:
+        """Products of these rows with each other, by replica and test."""
+        return [_squares(self.problem, rows) for rows in self.rows]
+
 
 def _rows(problem: Problem, slope: Sequence[Sequence[SparseBins]], residual: Sequence[Complex]) -> list[BinRows]:
     """Rows of the derivatives of every test's residual."""
     pairs = list(zip(slope, residual, strict=True))
     return list(by_threads(lambda one: bin_rows(one[0], one[1].shape[1]), pairs, problem.jobs))
+
+
+def _squares(problem: Problem, rows: Sequence[BinRows]) -> list[BandSquares]:
+    """Products of every test's rows with each other."""
+    pairs = list(zip(rows, problem.frequency, strict=True))
+    return list(by_threads(lambda one: one[0].squares_by_band(problem.whitener.starts(one[1])), pairs, problem.jobs))
 
 
 def _shared(problem: Problem, known: NormalEquations | None, again: Mask | None = None) -> tuple[dict[int, int], Mask]:

@@ -55,6 +55,10 @@ class Whitener(NamedTuple):
         """Band (m,) of each frequency f (m,)."""
         return _band(self.edges, f)
 
+    def starts(self, f: Array) -> NDArray[np.intp]:
+        """Places (b,) in rising frequencies f (m,) at which those of a band begin, of bands that hold some."""
+        return np.unique(self.band(f), return_index=True)[1]
+
     def scaled(self, scale: Array) -> "Whitener":
         """The same with whitened columns (t, b, k) times larger."""
         return self._replace(factor=scale[..., None] * self.factor)

@@ -68,7 +68,7 @@ def read_answers(texts: Mapping[str, str], voltage: float | None = None) -> dict
     Such a speed becomes `slope`: at full command, if the valve's flow were proportional to it as at null. A measured
     speed per volt is one of small commands; a speed at full command has no volt. The voltage itself is among the
     quantities, too.
-    Raises ParameterError naming the option for what cannot be read, is not positive, or is missing.
+    Raises ParameterError naming the option for what cannot be read or is not positive, or all that are missing.
     """
     found = {}
     if voltage is not None and not voltage > 0.0:
@@ -92,11 +92,15 @@ def read_answers(texts: Mapping[str, str], voltage: float | None = None) -> dict
             raise ParameterError(f"{option}: {text!r} must be positive")
     if voltage is not None:
         found["voltage"] = Quantity(voltage, "V", "measured", f"stated to lhpost6 new-machine: --voltage {voltage:g}")
-    for name, asked in ASKED.items():
-        if asked.needed and name not in found:
-            raise ParameterError(f"{option_of(name)} is missing: {asked.question.lower()} [{asked.unit}]")
+    lacking = [
+        f"{option_of(name)} is missing: {asked.question.lower()} [{asked.unit}]"
+        for name, asked in ASKED.items()
+        if asked.needed and name not in found
+    ]
     if "area" not in found and "bore" not in found:
-        raise ParameterError("--area is missing: the piston area that the oil acts on, or --bore and --rod")
+        lacking.append("--area is missing: the piston area that the oil acts on, or --bore and --rod")
+    if lacking:
+        raise ParameterError("; ".join(lacking))
     return found
 
 

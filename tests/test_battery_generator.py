@@ -401,10 +401,8 @@ def test_the_figure_of_a_battery_comes_first_and_is_the_same_however_often_it_is
     pytest.importorskip("matplotlib")
     from battery.curves import draw_curves
 
-    strength, names = (
-        {"1 to 2": scoring.Share(0, 0), "above 100": scoring.Share(8, 9)},
-        {"0.5 to 0.7": scoring.Share(3, 5)},
-    )
+    strength = {"1 to 2": scoring.Share(0, 0), "above 100": scoring.Share(8, 9)}
+    names = {"0.5 to 0.7": scoring.Share(3, 5)}
     draw_curves(strength, names, tmp_path / "scores.svg")
     drawn = (tmp_path / "scores.svg").read_bytes()
     draw_curves(strength, names, tmp_path / "scores.svg")

@@ -138,8 +138,8 @@ def draw_case(
     elif sort != "null":
         library = numbers()["unknown" if sort == "unknown" else "effect"]
         effects = [draw_effect(family, library[family], sizes, random, strength, variant) for family in families]
-        for effect in effects if sort != "unknown" else ():
-            values, moved = _alike(effect, table, values, moved)
+        for effect in effects:
+            values, moved = _alike(effect, library[effect.family], table, values, moved)
     described = [_describe(effect) for effect in effects]
     verdict, accept = VERDICTS[sort]
     name = random.bytes(5).hex()
@@ -237,10 +237,10 @@ def draw_parameters(model: Model, random: np.random.Generator, bold: bool) -> tu
 
 
 def _alike(
-    effect: Effect, model: Model, values: dict[str, dict], moved: dict[str, float]
+    effect: Effect, variants: list[dict], model: Model, values: dict[str, dict], moved: dict[str, float]
 ) -> tuple[dict[str, dict], dict[str, float]]:
-    """Parameters with the one that an effect adds `with`, if any, off in the direction of that effect."""
-    (name,) = {variant.get("with") for variant in numbers()["effect"][effect.family]}
+    """Parameters with the one that an effect of a family adds `with`, if any, off in the direction of that effect."""
+    (name,) = {variant.get("with") for variant in variants}
     if name is None:
         return values, moved
     table, key = name.rsplit(".", 1)

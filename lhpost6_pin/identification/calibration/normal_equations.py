@@ -48,8 +48,8 @@ class NormalEquations:
     def _copied(self) -> "NormalEquations":
         """A copy without the sums, which another problem or scale has its own of."""
         other = copy(self)
-        for name in ("whole", "rows", "squares"):
-            vars(other).pop(name, None)
+        _forget_sums(other)
+        vars(other).pop("whole", None)
         return other
 
     def only(self, places: Sequence[int]) -> "NormalEquations":
@@ -93,8 +93,8 @@ class NormalEquations:
     def released(self) -> "NormalEquations":
         """Itself, without what is kept to sum it again at once, which fills memory."""
         for one in (self, self.bias):
-            for name in ("rows", "squares") if one is not None else ():
-                vars(one).pop(name, None)
+            if one is not None:
+                _forget_sums(one)
         return self
 
     def of(self, tests: Sequence[int], columns: Mask | None = None) -> tuple[Array, Array]:
@@ -187,8 +187,7 @@ class NoiseBias:
         other.slope = [
             [[j.times(s) for j in slopes] for slopes, s in zip(slope, times, strict=True)] for slope in self.slope
         ]
-        for name in ("rows", "squares"):
-            vars(other).pop(name, None)
+        _forget_sums(other)
         return other
 
     @cached_property
@@ -201,6 +200,12 @@ class NoiseBias:
     def squares(self) -> list[list[BandSquares]]:
         """Products of these rows with each other, by replica and test."""
         return [_squares(self.problem, rows) for rows in self.rows]
+
+
+def _forget_sums(one: NormalEquations | NoiseBias) -> None:
+    """Drop what is kept of derivatives to sum them again."""
+    for name in ("rows", "squares"):
+        vars(one).pop(name, None)
 
 
 def _rows(problem: Problem, slope: Sequence[Sequence[SparseBins]], residual: Sequence[Complex]) -> list[BinRows]:

@@ -66,9 +66,9 @@ class Whitener(NamedTuple):
     def apply(self, test: int, bins: Complex, f: Array) -> Complex:
         """Whitened bins, shape (m, k, p) of a test's `bins` at f (m,): noise in them has unit power, uncorrelated."""
         out = np.empty_like(bins)
-        bands, first = np.unique(self.band(f), return_index=True)  # f rises: the bins of a band are contiguous
+        first = self.starts(f)
         used = np.flatnonzero(bins.any(axis=(0, 2)))
-        for b, low, high in zip(bands, first, (*first[1:], len(f)), strict=True):
+        for b, low, high in zip(self.band(f)[first], first, (*first[1:], len(f)), strict=True):
             part = bins[low:high, used]
             mixed = self.factor[test, b][:, used] @ part.swapaxes(0, 1).reshape(len(used), len(part) * bins.shape[2])
             out[low:high] = mixed.reshape(len(mixed), len(part), bins.shape[2]).swapaxes(0, 1)
@@ -91,7 +91,8 @@ def excess(whitener: Whitener, whitened: Sequence[Complex], frequency: Sequence[
 
 def mean_squares(whitener: Whitener, squares: Array, f: Array) -> tuple[Array, NDArray[np.intp]]:
     """Means (b, k) over bands of squares (m, k) of a test's bins at rising f (m,), and the bins in each band (b,)."""
-    _, first, counts = np.unique(whitener.band(f), return_index=True, return_counts=True)
+    first = whitener.starts(f)
+    counts = np.diff(first, append=len(f))
     return np.add.reduceat(squares, first, axis=0) / counts[:, None], counts
 
 

@@ -12,6 +12,9 @@ within their ranges never add up to more. The residual may contain E, and no les
 Where a force hardly varies, a gain and an offset are not separable. Coefficients that the records do not test are held
 at their nominal values, and the rest is solved again: the stated range of a held coefficient then widens the tolerance
 of the rest, and a finding lists it as an alternative.
+
+A drift looks like no error of calibration, and even a small one is of no sensor whose errors are constant. It is
+estimated with the errors E beside it, each with a standard deviation of one before the test: what they leave of it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,15 +33,16 @@ from .sensor_pairs import comparisons
 from .sensor_view import BAND, Regressor, SensorComparison
 from .sensors import SensorSet
 
-__all__ = ["ConsistencyFinding", "check_sensors", "scaled_inverse"]
+__all__ = ["LEVELS", "ConsistencyFinding", "check_sensors", "scaled_inverse"]
 
 
 Verdict = Literal["ok", "suspicious", "untested"]
 
 FOLLOWING = ("platen_velocity", "platen_acceleration", "actuator_displacement")  # compared with platen_displacement
 LATE = 0.125  # rad at the end of the band, 1 ms: a delay below it is a coefficient of the derivative
-LEVELS = ("offset", "drift")  # quantities identifiable in spite of noise
+LEVELS = ("offset", "drift")  # quantities identifiable in spite of noise, and that play of a pin changes
 CONFIDENCE = 3.0  # standard deviations
+PASSES = 4  # of a fit and the squares that it leaves
 LEAST_GAIN = 0.5  # of a regressor with such noise, from which on its delay, which noise shrinks as well, is a bound
 MOST_NOISE = 0.1  # share of noise in a column, less the others, above which its correction is not accurate
 
@@ -125,7 +129,8 @@ class _Sums(NamedTuple):
     xx: Array  # (p, p)
     xy: Array  # (p,)
     xe: Array  # (p, k)
-    ee: Array  # (k,)
+    ee: Array  # (k, k)
+    ey: Array  # (k,)
     noise: Array  # (p,) of X, summed over samples
     yy: float
     variance: float  # of y, summed over samples
@@ -136,8 +141,8 @@ class _Sums(NamedTuple):
 def _sums(c: SensorComparison) -> _Sums:
     x = np.stack([t.column for t in c.terms], axis=1) if c.terms else np.zeros((len(c.y), 0))
     n, noise = len(c.y), len(c.y) * np.array([t.variance for t in c.terms])
-    products = x.T @ x, x.T @ c.y, x.T @ c.errors, np.sum(c.errors**2, axis=0)
-    return _Sums(c.terms, *products, noise, float(c.y @ c.y), n * c.variance, n, c.independent)
+    products = x.T @ x, x.T @ c.y, x.T @ c.errors, c.errors.T @ c.errors
+    return _Sums(c.terms, *products, c.errors.T @ c.y, noise, float(c.y @ c.y), n * c.variance, n, c.independent)
 
 
 def _pooled(parts: Sequence[_Sums]) -> _Sums:
@@ -168,7 +173,7 @@ def _solved(s: _Sums, kept: Mask, noise: Array, noise_range: float) -> _Solved:
     moved = inverse @ s.xe
     square = float((s.yy - 2 * theta @ s.xy + theta @ s.xx @ theta) / s.samples)
     noise_left = (s.variance + float(theta**2 @ s.noise)) / s.samples
-    left = s.ee - 2 * np.sum(moved * s.xe, axis=0) + np.einsum("pk,pq,qk->k", moved, s.xx, moved)
+    left = np.diag(s.ee) - 2 * np.sum(moved * s.xe, axis=0) + np.einsum("pk,pq,qk->k", moved, s.xx, moved)
     spread = np.sqrt(max(square, noise_left) * s.samples / s.independent)
     bound = np.sqrt(3.0) * np.sum(np.abs(moved), axis=1)
     return _Solved(
@@ -182,6 +187,28 @@ def _solved(s: _Sums, kept: Mask, noise: Array, noise_range: float) -> _Solved:
         noise_left,
         float(np.sum(np.maximum(left, 0.0))) / s.samples,
     )
+
+
+def _beside_errors(s: _Sums) -> tuple[Array, Array, Array]:
+    """Coefficients (p,) with the errors E estimated beside them; standard errors and tolerances, of what E leaves.
+
+    The squares of the residual are those of noise, or what both leave; errors that are not in E raise them.
+    """
+    count, total = len(s.xy), len(s.xy) + len(s.ey)
+    products = np.block([[s.xx, s.xe], [s.xe.T, s.ee]])
+    right, prior = np.concatenate([s.xy, s.ey]), np.diag(np.arange(total) >= count).astype(np.float64)
+    square = s.variance / s.samples
+    for _ in range(PASSES):
+        spread = square * s.samples / s.independent
+        normal = products + spread * prior
+        inverse = scaled_inverse(normal, np.diag(normal))
+        theta = inverse @ right
+        left = float(s.yy - 2 * theta @ right + theta @ products @ theta) / s.samples
+        square = max(left, s.variance / s.samples)
+    sampled = np.diag(spread * inverse @ products @ inverse)
+    assumed = np.diag(spread**2 * inverse @ prior @ inverse)
+    errors, tolerances = np.sqrt(np.maximum(sampled, 0.0)), CONFIDENCE * np.sqrt(np.maximum(assumed, 0.0))
+    return theta[:count], errors[:count], tolerances[:count]
 
 
 def _findings(check: str, channel: str, s: _Sums, noise_range: float, late: float) -> Iterator[ConsistencyFinding]:
@@ -201,6 +228,8 @@ def _findings(check: str, channel: str, s: _Sums, noise_range: float, late: floa
             gain = by.theta[0] or 1.0
             value, sigma = late + term.delay - value / gain, sigma / abs(gain)
             range_ = by.bound[i] + by.doubt[i]  # delays have limits, not deviations
+        if term.quantity == "drift":
+            value, sigma, range_ = (of[i] for of in _beside_errors(s))
         value, sigma, due, range_ = float(value), float(sigma), float(term.expected), float(range_)
         others = () if held[i] else tuple(s.terms[k].quantity for k in np.flatnonzero(held & (moved[i] > sigma)))
         # noise of a regressor only shrinks its coefficient: a delay that is clear is no less, if its gain is large

@@ -13,7 +13,7 @@ import xarray as xr
 from ..core.names import AXES
 from ..data.alignment import align_record
 from ..data.channels import LAYOUT
-from ..data.consistency import ConsistencyFinding, check_sensors
+from ..data.consistency import LEVELS, ConsistencyFinding, check_sensors
 from ..data.layout_faults import RecordFinding
 from ..data.sensors import SensorSet
 from ..data.turned_displacement import turned_displacement
@@ -63,7 +63,7 @@ def find_sensor_faults(
     """Faults of redundant sensors, pooled over records, and turned signs; raises what `check_sensors` does.
 
     Axes of the displacement that are turned are turned back before anything else is judged. Play of actuators that are
-    `loose` shifts the means of their lengths, which are not reported.
+    `loose` shifts the means of their lengths, within a record as well: neither is reported.
     """
     turned = _in_most([turned_displacement(record, plant.machine)[0] for record in records])
     records = correct_records(records, turned)
@@ -74,7 +74,7 @@ def find_sensor_faults(
         findings = check_sensors(plant, [align_record(r, behind) for r in records], sensors)
     shifted = {f"actuator_displacement[{name}]" for name in loose}
     wrong = [f for f in findings if f.check in _CHECKS and f.verdict == "suspicious"]
-    faults = [_fault(f, sensors) for f in wrong if f.quantity != "offset" or f.channel not in shifted]
+    faults = [_fault(f, sensors) for f in wrong if f.quantity not in LEVELS or f.channel not in shifted]
     opposed = _in_most([turned_signs(record, plant.machine) for record in records])
     return (*turned, *(f for f in faults if f is not None), *late, *opposed)
 

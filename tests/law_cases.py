@@ -186,7 +186,7 @@ _NUMBERS: dict[str, tuple[float, ...]] = {
     "external_leakage": (5e-11, 0.4),
     "null_leakage": (1e-6, 0.05),
     "null_bias": (0.01,),
-    "deadband": (0.005,),
+    "deadband": (0.005, 0.3),
     "flow_curve": (0.2, 0.5, 1.0),
     "entrained_air": (0.02, 1.2),
     "cavitation": (0.5, 15e6),  # far above what it is, so that the cases are in it

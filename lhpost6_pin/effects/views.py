@@ -83,6 +83,7 @@ def view_hydraulic(numbers):
         numbers[31],
         numbers[32],
         numbers[33],
+        numbers[34],
     )
 
 

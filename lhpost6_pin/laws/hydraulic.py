@@ -60,6 +60,7 @@ class Hydraulic(NamedTuple):
     null_width: Annotated[float, "1"] = 0.0
     null_bias: Annotated[float, "1"] = 0.0
     overlap: Annotated[float, "1"] = 0.0
+    overlap_rounding: Annotated[float, "1"] = 0.0
     air: Annotated[float, "1"] = 0.0
     air_index: Annotated[float, "1"] = 0.0
     voids: Annotated[float, "1"] = 0.0
@@ -98,7 +99,10 @@ def _opened(p, modified, spool):
     """Signed opening of the valve."""
     if not modified:
         return opening(spool, p.flow_curve)
-    opened = opening(dead_zone(spool + p.null_bias, p.overlap), p.flow_curve)
+    spool += p.null_bias
+    if p.overlap != 0.0:
+        spool = dead_zone(spool, p.overlap, p.overlap_rounding)
+    opened = opening(spool, p.flow_curve)
     if p.curve_error != 0.0:
         opened = corrected_opening(opened, p.curve_error, p.curve_side, p.curve_power)
     return opened

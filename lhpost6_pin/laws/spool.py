@@ -1,10 +1,12 @@
 """A spool as its ports see it: off its null, overlapped, with a flow curve of its own.
 
-x -> dz(x + x_0, d),  dz(x, d) = sgn(x) max(|x| - d, 0)
+x -> dz(x + x_0),  dz(x) = x + (sqrt((x - d)^2 + r^2) - sqrt((x + d)^2 + r^2)) / 2,  r = rho d
 g -> g (1 + e s |g|^m) of the opening g, s the share of the side on which it opens
 
-x [1] spool over stroke, x_0 null bias, d overlap, e relative error of the flow, m its power of the opening.
-Stored energy: none. Source: Merritt (1967), Section 5.3 (overlap); the curve's error is a first-order correction.
+x [1] spool over stroke, x_0 null bias, d overlap, rho rounding of its edges: where it is 0, dz is sgn(x) max(|x| - d, 0).
+e relative error of the flow, m its power of the opening.
+Stored energy: none. Source: Merritt (1967), Section 5.3 (overlap); clearance and rounded edges give an overlapped valve some flow gain at null, here as
+1 - 1 / sqrt(1 + rho^2) of that beyond; the curve's error is a first-order correction.
 """
 
 import math
@@ -27,6 +29,7 @@ class Deadband(NamedTuple):
     """Parameters of an overlapped spool."""
 
     overlap: Annotated[float, "1"]
+    rounding: Annotated[float, "1"]
 
 
 class FlowCurve(NamedTuple):
@@ -39,15 +42,16 @@ class FlowCurve(NamedTuple):
 
 LAWS = {
     "null_bias": Law(NullBias, modifies="oil", fields=("null_bias",)),
-    "deadband": Law(Deadband, modifies="oil", fields=("overlap",)),
+    "deadband": Law(Deadband, modifies="oil", fields=("overlap", "overlap_rounding")),
     "flow_curve": Law(FlowCurve, modifies="oil", fields=("curve_error", "curve_side", "curve_power")),
 }
 
 
 @compiled
-def dead_zone(x: float, overlap: float) -> float:
-    """What is left of x [1] beyond an overlap [1]."""
-    return math.copysign(max(abs(x) - overlap, 0.0), x)
+def dead_zone(x: float, overlap: float, rounding: float) -> float:
+    """What is left of x [1] beyond an overlap [1] with edges rounded by a share of it."""
+    radius = rounding * overlap
+    return x + 0.5 * (math.hypot(x - overlap, radius) - math.hypot(x + overlap, radius))
 
 
 @compiled

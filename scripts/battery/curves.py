@@ -30,7 +30,7 @@ def draw_curves(strength: Mapping[str, Share], reliable: Mapping[str, Share], pa
             right.bar(place, high - low, 0.7, low, color=FAINT, alpha=0.35, label=label)
         _shares(right, reliable)
         right.set(title="Names that were right", xlabel="stated probability of the name")
-        right.legend(loc="lower right", bbox_to_anchor=(1.0, 0.13), frameon=False)
+        right.legend(loc="lower right", bbox_to_anchor=(1.0, 0.19), frameon=False)
         figure.savefig(beside, format="svg", metadata=PLAIN, facecolor=PAPER)
 
 
@@ -40,7 +40,8 @@ def _shares(axes: Axes, shares: Mapping[str, Share]) -> None:
         low, high = (100.0 * edge for edge in wilson(*share))
         axes.plot((place, place), (low, high), color=FOUND, lw=2.0)
         axes.plot(place, 100.0 * share.hits / share.of, "o", color=FOUND, ms=8)
-        axes.text(place, -11.0, f"{share.hits} of {share.of}", ha="center", va="center", fontsize=10, color=INK)
-    axes.set_xticks(range(len(shares)), list(shares), fontsize=10)
-    axes.set(xlim=(-0.6, len(shares) - 0.4), ylim=(-16.0, 104.0), ylabel="share [%]", yticks=range(0, 101, 20))
+        axes.text(place, -14.0, f"{share.hits}\nof {share.of}", ha="center", va="center", fontsize=10, color=INK)
+    short = [words.replace(" to ", "–").replace("above", ">") for words in shares]
+    axes.set_xticks(range(len(shares)), short, fontsize=10)
+    axes.set(xlim=(-0.6, len(shares) - 0.4), ylim=(-24.0, 104.0), ylabel="share [%]", yticks=range(0, 101, 20))
     axes.grid(axis="y", color=FAINT, alpha=0.25)

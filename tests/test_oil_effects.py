@@ -20,7 +20,8 @@ from lhpost6_pin.effects import supply as shared
 from lhpost6_pin.effects.evaluate import advance_states
 from lhpost6_pin.effects.registry import parameters_of
 from lhpost6_pin.identification.residuals import evaluate_residuals
-from lhpost6_pin.laws import bulk, chamber, hydraulic, leaks, lines, orifice, play, spool, supply
+from lhpost6_pin.laws import bulk, chamber, hydraulic, leaks, lines, orifice, play, supply
+from lhpost6_pin.laws.spool import dead_zone
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.mechanics.plant import Plant, make_plant
 from lhpost6_pin.mechanics.valve_delay import delayed_spools
@@ -206,18 +207,18 @@ def test_edges_of_an_overlap_may_be_rounded():
     slope = derivative_at(0.0, rounding=0.3)
     assert slope == pytest.approx(1.0 - 1.0 / math.hypot(1.0, 0.3), rel=1e-6)  # cubic terms: (h / d)^2
     x = np.linspace(-0.05, 0.05, 2001)
-    rounded = np.array([spool.dead_zone(one, 0.005, 0.3) for one in x])
+    rounded = np.array([dead_zone(one, 0.005, 0.3) for one in x])
     assert (np.diff(rounded) > 0.0).all()
     np.testing.assert_allclose(rounded, -rounded[::-1], atol=1e-17)
     far = np.abs(x) > 0.04  # what is left of the rounding: r^2 d / (x^2 - d^2) / 2 = 3.6e-6
     np.testing.assert_allclose(rounded[far], (np.abs(x) - 0.005)[far] * np.sign(x)[far], atol=4e-6)
-    sharp = [spool.dead_zone(one, 0.005, 1e-9) for one in x]
+    sharp = [dead_zone(one, 0.005, 1e-9) for one in x]
     np.testing.assert_allclose(sharp, np.sign(x) * np.maximum(np.abs(x) - 0.005, 0.0), atol=1e-11)  # 1e-9 d
 
 
 def derivative_at(x: float, *, rounding: float, step: float = 1e-6) -> float:
     """Of what an overlap of 0.005 leaves, by central differences."""
-    return (spool.dead_zone(x + step, 0.005, rounding) - spool.dead_zone(x - step, 0.005, rounding)) / (2.0 * step)
+    return (dead_zone(x + step, 0.005, rounding) - dead_zone(x - step, 0.005, rounding)) / (2.0 * step)
 
 
 def test_a_dead_volume_is_as_much_more_chamber():

@@ -21,7 +21,7 @@ from .floor import NOISE
 from .search_state import Round
 from .unexplained import forces_explained
 from .verdict import SensorFinding
-from .verdict_notes import before_screening, interval_note, open_summary, refit_summary
+from .verdict_notes import before_screening, drift_note, interval_note, open_summary, refit_summary
 from .withdrawal import Why
 
 __all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "where", "worse_note"]
@@ -301,8 +301,8 @@ def _unexplained_summary(found: Discovery, effects: str) -> str:
     function, place = verdict.residual_function, "the residual exceeds the expected scatter"
     if function is not None:
         place = f"an effect acts on {where(function.components)}, as a function of {function.description}"
-    elif drifting := [s.name.partition(" ")[2] for s in verdict.sensors if s.name.startswith("drift ")]:
-        place = f"{', '.join(drifting)} drift against the platen's pose within tests"
+    elif drifts := drift_note(verdict):
+        place = drifts
     near = f" Nearest family: {' and '.join(map(title_of, verdict.nearest))}." if verdict.nearest else ""
     return f"{effects + '; in addition ' if effects else ''}{place}; no family of the library explains it.{near}"
 

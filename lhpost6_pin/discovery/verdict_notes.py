@@ -15,11 +15,13 @@ from .search_state import Search
 
 if TYPE_CHECKING:
     from .discover import Discovery
+    from .verdict import Verdict
 
 __all__ = [
     "EXPECTED_SCATTER",
     "balance_note",
     "before_screening",
+    "drift_note",
     "floor_note",
     "form_note",
     "interval_note",
@@ -168,6 +170,14 @@ def form_note(found: "Discovery") -> str:
         f"{name}: {family.title}, {family.equation}." for name, family in of.items() if family.search == "background"
     ]
     return " ".join(["Freed in every fit, and no missing effects:", *own]) if own else ""
+
+
+def drift_note(verdict: "Verdict") -> str:
+    """Lengths that drift within tests, and what may cause that; empty without any."""
+    drifting = [s.name.partition(" ")[2] for s in verdict.sensors if s.name.startswith("drift ")]
+    drifts = f"drift{'s' * (len(drifting) == 1)} against the platen's pose within tests"
+    cause = "a rod that lengthens with heat, a mount that creeps, or the zero of a sensor"
+    return f"{', '.join(drifting)} {drifts} ({cause})" if drifting else ""
 
 
 def balance_note(balances: Sequence[Balance]) -> str:

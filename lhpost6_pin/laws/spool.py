@@ -3,10 +3,10 @@
 x -> dz(x + x_0),  dz(x) = x + (sqrt((x - d)^2 + r^2) - sqrt((x + d)^2 + r^2)) / 2,  r = rho d
 g -> g (1 + e s |g|^m) of the opening g, s the share of the side on which it opens
 
-x [1] spool over stroke, x_0 null bias, d overlap, rho rounding of its edges: where it is 0, dz is sgn(x) max(|x| - d, 0).
+x [1] spool over stroke, x_0 null bias, d overlap, rho rounding of its edges (with 0, dz is sgn(x) max(|x| - d, 0)),
 e relative error of the flow, m its power of the opening.
-Stored energy: none. Source: Merritt (1967), Section 5.3 (overlap); clearance and rounded edges give an overlapped valve some flow gain at null, here as
-1 - 1 / sqrt(1 + rho^2) of that beyond; the curve's error is a first-order correction.
+Stored energy: none. Source: Merritt (1967), Section 5.3 (overlap). Clearance and rounded edges leave such a valve
+some flow gain at null, here 1 - 1 / sqrt(1 + rho^2) of that beyond. The curve's error is a first-order correction.
 """
 
 import math

@@ -16,6 +16,7 @@ from ...discovery.verdict_notes import (
     EXPECTED_SCATTER,
     balance_note,
     before_screening,
+    drift_note,
     floor_note,
     form_note,
     interval_note,
@@ -267,10 +268,8 @@ def _effect_blocks(found: Discovery) -> list[Block]:
     if verdict.residual_function is not None:
         blocks.append(residual_function_figure(verdict.residual_function))
     elif verdict.word == "unexplained":
-        blocks.append(
-            "The residual exceeds the expected scatter and is no function of an actuator's or strut's position or "
-            "velocity."
-        )
+        drifts = f"{drift_note(verdict)}; " if drift_note(verdict) else ""
+        blocks.append(f"{drifts}the residual is no function of an actuator's or strut's position or velocity.")
     if verdict.where:
         blocks.append(f"The largest residuals are in: {'; '.join(s.description for s in verdict.where)}.")
     if verdict.nearest:

@@ -42,6 +42,7 @@ FOLLOWING = ("platen_velocity", "platen_acceleration", "actuator_displacement") 
 LATE = 0.125  # rad at the end of the band, 1 ms: a delay below it is a coefficient of the derivative
 LEVELS = ("offset", "drift")  # quantities identifiable in spite of noise, and that play of a pin changes
 CONFIDENCE = 3.0  # standard deviations
+SURE = 5.0  # those of a drift, which has no tolerance beside what it is estimated with
 PASSES = 4  # of a fit and the squares that it leaves
 LEAST_GAIN = 0.5  # of a regressor with such noise, from which on its delay, which noise shrinks as well, is a bound
 MOST_NOISE = 0.1  # share of noise in a column, less the others, above which its correction is not accurate
@@ -234,7 +235,7 @@ def _findings(check: str, channel: str, s: _Sums, noise_range: float, late: floa
         others = () if held[i] else tuple(s.terms[k].quantity for k in np.flatnonzero(held & (moved[i] > sigma)))
         # noise of a regressor only shrinks its coefficient: a delay that is clear is no less, if its gain is large
         bounded = term.delay is not None and free.theta[0] > LEAST_GAIN and free.error[i] < free.lawful[i]
-        verdict = _verdict(abs(value - due), sigma, range_)
+        verdict = _verdict(abs(value - due), sigma, range_, SURE if term.quantity == "drift" else CONFIDENCE)
         verdict = "untested" if held[i] and not (bounded and verdict == "suspicious") else verdict
         unit = term.unit or unit_y
         yield ConsistencyFinding(check, channel, term.quantity, unit, value, sigma, due, range_, verdict, others)
@@ -247,9 +248,9 @@ def _findings(check: str, channel: str, s: _Sums, noise_range: float, late: floa
     yield ConsistencyFinding(check, channel, "residual", unit_y, rms, sigma, floor, range_, verdict)
 
 
-def _verdict(off: float, error: float, tolerance: float) -> Verdict:
-    """Suspicious if beyond noise and tolerance."""
-    return "suspicious" if off > np.hypot(CONFIDENCE * error, tolerance) else "ok"
+def _verdict(off: float, error: float, tolerance: float, confidence: float = CONFIDENCE) -> Verdict:
+    """Suspicious if so many deviations beyond noise and calibration; the tolerance is `CONFIDENCE` of the latter."""
+    return "suspicious" if off > confidence * np.hypot(error, tolerance / CONFIDENCE) else "ok"
 
 
 def scaled_inverse(matrix: Array, squares: Array) -> Array:

@@ -63,6 +63,7 @@ STRONG: dict[str, dict[str, float]] = {
     "dead_volume": {},
     "swivel_play": {"half_play": 5e-4},
     "valve_deadband": {},
+    "rounded_deadband": {"rounding": 0.4},
     "null_leakage": {"leakage": 2e-6},
     "spool_null_bias": {},
     "supply_droop": {"droop": 6e6, "time": 0.05},

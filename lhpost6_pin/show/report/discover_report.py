@@ -268,8 +268,8 @@ def _effect_blocks(found: Discovery) -> list[Block]:
     if verdict.residual_function is not None:
         blocks.append(residual_function_figure(verdict.residual_function))
     elif verdict.word == "unexplained":
-        drifts = f"{drift_note(verdict)}; " if drift_note(verdict) else ""
-        blocks.append(f"{drifts}the residual is no function of an actuator's or strut's position or velocity.")
+        none = "The residual is no function of an actuator's or strut's position or velocity"
+        blocks.append(f"{drift_note(verdict) or none}.")
     if verdict.where:
         blocks.append(f"The largest residuals are in: {'; '.join(s.description for s in verdict.where)}.")
     if verdict.nearest:

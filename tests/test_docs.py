@@ -216,6 +216,16 @@ def test_files_and_modules_that_pages_name_exist_with_the_names_given_in_them(pa
         assert folder.is_dir() or folder.with_suffix(".py").is_file(), module
 
 
+def test_modules_whose_functions_a_page_lists_are_in_the_reference():
+    """The site takes links to them from there; it is built by the slow tests alone."""
+    every = "\n".join(page.read_text(encoding="utf-8") for page in BY_HAND)
+    listed, known = (
+        {module for names in re.findall(rf"<!-- insert: {what} (.*?) -->", every) for module in names.split()}
+        for what in ("functions", "api")
+    )
+    assert listed and listed <= known
+
+
 def test_identifiers_of_the_glossary_are_in_use():
     sources = [*(ROOT / "lhpost6_pin").rglob("*.py"), *(ROOT / "models").rglob("*.toml")]
     words = set(re.findall(r"\w+", "".join(path.read_text(encoding="utf-8") for path in sources)))

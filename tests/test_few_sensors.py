@@ -394,6 +394,7 @@ def test_an_effect_that_a_held_out_test_hardly_shows_stays_only_where_that_test_
         (243.0, 394.0, 0.4, "held_out"),
         (300.0, 394.0, 0.4, None),  # most of the gain that is expected
         (100.0, 394.0, 0.69, "held_out"),  # less than three tenths of it
+        (262.0, 1000.0, 0.69, None),  # a dead volume, as well: what has another form gains at most a tenth of that
         (13.5, 12.1, np.nan, None),  # thrust along the platen's normal where it hardly tilts: nothing is beyond noise
         (3.5, 13.5, np.nan, None),  # a leak, by two deviations of noise less than expected, by three more than by none
         (-1.0, 13.5, np.nan, "held_out"),

@@ -123,15 +123,15 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     """Whether held-out tests reject an effect: it does not close the gap there.
 
     original is their residual before any effect, `after` that of the search's solution. The effect is compared with
-    everything else refitted without it, in the residuals that its family shows in. It must gain there a share of
-    what is expected of it, and more than that scatters by noise, sqrt(2 expected); and lower the squares in some
-    column by a share of those before any effect. Not so where parameters run to their bounds without it, where it
-    explains half of what is beyond noise there, or where it gains most of what is expected, and is one of two of a
-    family or explains a good part of that. Where nothing is beyond noise without it, no form of another effect can
-    pass for it, and any gain speaks for it: with it the gain has mean `expected`, without it -expected. One that the
-    held-out tests do not excite, with an expected gain within chance, stays, unless it loses more than by chance there.
-    On a table with one actuator these two do not hold: every test excites it, and few sensors leave much to be
-    confused.
+    everything else refitted without it, in the residuals that its family shows in. It must gain there more than
+    scatters by noise, sqrt(2 expected), and a share of what is expected of it, or as much as no form of another does;
+    and lower the squares in some column by a share of those before any effect. Not so where parameters run to their
+    bounds without it, where it explains half of what is beyond noise there, or where it gains most of what is
+    expected, and is one of two of a family or explains a good part of that. Where nothing is beyond noise without it,
+    no form of another effect can pass for it, and any gain speaks for it: with it the gain has mean `expected`,
+    without it -expected. One that the held-out tests do not excite, with an expected gain within chance, stays, unless
+    it loses more than by chance there. On a table with one actuator these two do not hold: every test excites it, and
+    few sensors leave much to be confused.
     """
     if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
         return None  # a sensor's error
@@ -147,7 +147,7 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     share = share_explained(held, before.whitened, after.whitened, family, found.numbers)
     if not single and np.isnan(share):
         return withdrawn if gain < 0.0 else None
-    if gain < max(np.sqrt(2.0 * expected), n("accept.held_out") * expected):
+    if gain < max(np.sqrt(2.0 * expected), min(n("accept.held_out") * expected, n("accept.proven"))):
         return withdrawn
     first, old, new = (squares_by_column(at.whitened)[rows] for at in (original, before, after))
     if lowers_squares(first, old, new, n("accept.of_first")) or is_absorbed(one.candidate, absorbing(less)):

@@ -264,6 +264,7 @@ _RANGES = {
     (3e-3, 0.1): "overlap width air share damping",
     (-1e6, 1e6): "load force drop work change_a change_b",
     (0.0, 1e-3): "play",
+    (0.0, 2.0): "rounding",
     (2e2, 5e5): "closing",
     (0.0, 2e4): "friction",
     (0.0, 1e-10): "across",

@@ -51,7 +51,8 @@ LAWS = {
 def dead_zone(x: float, overlap: float, rounding: float) -> float:
     """What is left of x [1] beyond an overlap [1] with edges rounded by a share of it."""
     radius = rounding * overlap
-    return x + 0.5 * (math.hypot(x - overlap, radius) - math.hypot(x + overlap, radius))
+    before, behind = math.sqrt((x - overlap) ** 2 + radius**2), math.sqrt((x + overlap) ** 2 + radius**2)
+    return x + 0.5 * (before - behind)
 
 
 @compiled

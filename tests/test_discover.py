@@ -818,7 +818,7 @@ def test_an_effect_is_not_credited_with_what_others_gain(found, monkeypatch):
     search, one = found.search, candidate("valve_deadband", "H1")
     own = one.fit_parameters((1e-6,), search.numbers)
     problem, _ = with_candidate(search.problem, one, (1e-6,), own, search.solution.x)
-    x = np.insert(search.solution.x, [len(search.problem.parameters)] * len(own), 0.0)
+    x = np.insert(search.solution.x, len(search.problem.parameters), 0.0)
     rest = problem.residual(OperatingPoint(problem, x))
     added = (*search.added, replace(search.added[0], candidate=one))
     both = replace(search, problem=problem, solution=search.solution._replace(x=x, residual=rest), added=added)

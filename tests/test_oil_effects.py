@@ -197,7 +197,7 @@ def test_bias_and_overlap_shift_the_flow_curve():
     for x in (-0.3, -0.004, 0.0, 0.02, 0.5):
         assert flow(x, null_bias=0.01) == pytest.approx(standard(x + 0.01), rel=1e-14)
         beyond = math.copysign(max(abs(x) - 0.005, 0.0), x)
-        assert flow(x, overlap=0.005) == pytest.approx(standard(beyond), rel=1e-12, abs=1e-17)  # two roundings of x
+        assert flow(x, overlap=0.005) == pytest.approx(standard(beyond), rel=1e-14, abs=1e-18)
         assert flow(x, curve_error=0.2) == pytest.approx(1.2 * standard(x), rel=1e-14, abs=1e-18)
         one_sided = (1.2 if x > 0.0 else 1.0) * standard(x)
         assert flow(x, curve_error=0.2, curve_side=1.0) == pytest.approx(one_sided, rel=1e-14, abs=1e-18)
@@ -218,7 +218,7 @@ def test_edges_of_an_overlap_may_be_rounded():
 
 
 def test_rounded_edges_describe_an_overlap_of_another_form():
-    """X - d tanh(x / d) differs from sharp edges most near null: spools at rest there were unexplained."""
+    """Where x - d tanh(x / d) is left, sharp edges differ most near null: spools at rest were unexplained."""
     x = np.linspace(-0.02, 0.02, 801)
     other = x - 0.005 * np.tanh(x / 0.005)
 

@@ -111,6 +111,7 @@ def make_whitener(
     frequency: Sequence[Array],
     edges: Array,
     groups: NDArray[np.int64] | None = None,
+    order: NDArray[np.intp] | None = None,
 ) -> Whitener:
     """Whitener from realisations of every test's noise, bins (m, k) at its frequencies (m,).
 
@@ -142,7 +143,12 @@ def make_whitener(
         matrix = rows.T @ rows.conj() / len(rows)  # E[x x^H]
         if groups is not None:
             matrix = np.where(groups[:, None] == groups, matrix, 0.0)
-        factors[:, b] = _uncorrelated(matrix, len(rows)) @ factors[:, b]
+        if order is None:
+            factors[:, b] = _uncorrelated(matrix, len(rows)) @ factors[:, b]
+        else:
+            mixed = np.zeros_like(matrix)
+            mixed[np.ix_(order, order)] = _uncorrelated(matrix[np.ix_(order, order)], len(rows))
+            factors[:, b] = mixed @ factors[:, b]
     return Whitener(edges, factors)
 
 

@@ -62,6 +62,17 @@ def test_the_table_at_rest_has_the_pressures_of_the_reports_machine():
 
 
 @pytest.mark.slow
+def test_legs_that_leak_hold_as_much_friction_at_rest_as_they_can_push_against():
+    legs, platen = nominal()
+    held = np.full(25, 0.7)
+    rest, _ = simulate.at_rest(legs, platen, held)
+    np.testing.assert_array_equal(rest[rates.SEAL : rates.SPOOL], 0.7)
+    legs["external_b"][:4] = 8e-11  # leaves 0.9 MPa of the 5.5 in the piston-side chambers
+    rest, _ = simulate.at_rest(legs, platen, held)
+    np.testing.assert_array_equal(rest[rates.SEAL : rates.SPOOL], 0.35)
+
+
+@pytest.mark.slow
 def test_the_platen_rings_on_its_oil_columns_at_the_known_frequencies():
     legs, platen = nominal()
     legs["seal"] = legs["pad"] = legs["viscous"] = legs["leakage"] = 0.0

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from scipy.optimize import least_squares
 
-from .rates import PA, PAD, PB, PULL, SEAL, SHOWN, SPOOL, STATES, TWIST, rates
+from .rates import PA, PB, PULL, SEAL, SHOWN, SPOOL, STATES, TWIST, rates
 from .table import lengths, mass_matrix, turned
 
 __all__ = ["Channels", "Gains", "RATE", "make_gains", "simulate"]
@@ -94,6 +94,7 @@ def at_rest(legs: np.ndarray, platen: np.ndarray, held: np.ndarray | None = None
     """State and spools of the static equilibrium: no acceleration, no flow, no forces of actuators on each other.
 
     held (25) are the shares of their friction that the seals, and the pads along two axes, hold; by default none.
+    Where leaking legs cannot push against so much friction, it is half of that, a quarter, or none.
     """
     still = legs.copy()
     still["gap"] = 0.0  # play is crossed at rest without force
@@ -103,8 +104,6 @@ def at_rest(legs: np.ndarray, platen: np.ndarray, held: np.ndarray | None = None
     horizontal = legs["kind"][:10] == 0
     n_b = int(horizontal.sum())
     y, dy, shown = np.zeros(STATES), np.zeros(STATES), np.zeros(SHOWN)
-    if held is not None:
-        y[SEAL:PAD], y[PAD:SPOOL] = held[:13], held[13:]
 
     def unbalance(guess: np.ndarray) -> np.ndarray:
         y[PA : PA + 10], y[PB : PB + n_b] = guess[:10] * 1e6, guess[10 : 10 + n_b] * 1e6
@@ -121,15 +120,18 @@ def at_rest(legs: np.ndarray, platen: np.ndarray, held: np.ndarray | None = None
     spool = np.cbrt(3.0 * legs["overlap"][:10] ** 2 * seep) + seep - legs["bias"][:10]
     guess = np.concatenate([pa / 1e6, np.full(n_b, 8.6), spool * 1e3])
     least = np.concatenate([np.full(10 + n_b, platen[0]["back_pressure"] / 1e6), np.full(10, -100.0)])
-    solved = least_squares(
-        unbalance,
-        *(guess, "2-point", (least, np.full(len(guess), 100.0))),
-        x_scale=np.maximum(np.abs(guess), 0.1),
-        **dict.fromkeys(("ftol", "xtol", "gtol"), 1e-14),
-    )
-    if np.abs(unbalance(solved.x)).max() > 1e-3:
-        raise ArithmeticError(f"no state of rest: {solved.message}")
-    return y, solved.x[10 + n_b :] * 1e-3
+    friction = np.zeros(SPOOL - SEAL) if held is None else held
+    for share in (1.0, 0.5, 0.25, 0.0):
+        y[SEAL:SPOOL] = share * friction
+        solved = least_squares(
+            unbalance,
+            *(guess, "2-point", (least, np.full(len(guess), 100.0))),
+            x_scale=np.maximum(np.abs(guess), 0.1),
+            **dict.fromkeys(("ftol", "xtol", "gtol"), 1e-14),
+        )
+        if np.abs(unbalance(solved.x)).max() <= 1e-3:
+            return y, solved.x[10 + n_b :] * 1e-3
+    raise ArithmeticError(f"no state of rest: {solved.message}")
 
 
 def simulate(

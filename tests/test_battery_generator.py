@@ -23,7 +23,8 @@ from battery import (
 from blind_battery import refuse_other_draw
 
 from lhpost6_pin.data.records import load_record
-from lhpost6_pin.identification.calibration.bin_rows import dense_rows, row_by_column
+from lhpost6_pin.identification.calibration.bin_rows import bin_rows, row_by_column
+from lhpost6_pin.identification.calibration.sparse_bins import sparse_bins
 from lhpost6_pin.machine.machine import load_machine
 from lhpost6_pin.machine.machine_toml import save_machine_toml
 
@@ -443,7 +444,7 @@ def test_baselines_see_the_columns_of_all_residuals():
     bins = rng.normal(size=(4, 3, 2)) + 1j * rng.normal(size=(4, 3, 2))
     bins[:, 1, 0] = 0.0
     for k in range(2):
-        seen = dense_rows(bins).times(np.eye(2)[k])
+        seen = bin_rows([sparse_bins(bins)], 3).times(np.eye(2)[k])
         np.testing.assert_array_equal(seen.ravel(), row_by_column(bins[..., k], np.ones((4, 3))).ravel())
 
 

@@ -3,13 +3,8 @@
 import numpy as np
 import pytest
 
-from lhpost6_pin.identification.calibration.bin_rows import (
-    bin_rows,
-    dense_rows,
-    row_by_column,
-    sparse_bins,
-    squares_of,
-)
+from lhpost6_pin.identification.calibration.bin_rows import bin_rows, row_by_column, squares_of
+from lhpost6_pin.identification.calibration.sparse_bins import sparse_bins
 
 M, C, P = 12, 5, 7
 
@@ -26,6 +21,11 @@ def rng():
     return np.random.default_rng(3)
 
 
+def rows_of(bins: np.ndarray):
+    """Rows of quantities (m, c, p) given together."""
+    return bin_rows([sparse_bins(bins)], C)
+
+
 def real(bins: np.ndarray, root: np.ndarray) -> np.ndarray:
     """The same as a full real matrix (2 m c, p)."""
     scaled = bins * np.sqrt(2.0) / root[..., None]
@@ -35,7 +35,7 @@ def real(bins: np.ndarray, root: np.ndarray) -> np.ndarray:
 
 def test_products_are_those_of_full_matrices(bins, rng):
     other, rest, root = bins[..., ::-1] * 2.0, bins[..., 0] + 1.0, 1.0 + rng.random((M, C))
-    rows, more = dense_rows(bins).weighed(root), dense_rows(other).weighed(root)
+    rows, more = rows_of(bins).weighed(root), rows_of(other).weighed(root)
     x = rng.normal(size=P)
     full, beside = real(bins, root), real(other, root)
     np.testing.assert_allclose(rows.squares(), full.T @ full, atol=1e-12)  # rounding of sums of order one
@@ -46,21 +46,21 @@ def test_products_are_those_of_full_matrices(bins, rng):
     np.testing.assert_allclose(squares_of(rows.times(x)), 0.5 * (explained**2).sum(axis=0), atol=1e-12)
 
 
-def test_rows_of_sparse_quantities_are_those_of_dense_ones(bins):
+def test_rows_of_quantities_given_one_by_one_are_those_of_all_together(bins):
     one = bin_rows([sparse_bins(bins[..., p]) for p in range(P)], C)
-    np.testing.assert_allclose(one.squares(), dense_rows(bins).squares(), atol=1e-12)
+    np.testing.assert_allclose(one.squares(), rows_of(bins).squares(), atol=1e-12)
 
 
 def test_differences_sums_and_neighbours(bins, rng):
     ones, parts = np.ones((M, C)), rng.normal(size=(P, 3))
     changed = bins + 0.1 * (rng.random((C, P)) < 0.3)
-    less = dense_rows(changed).less(dense_rows(bins))
+    less = rows_of(changed).less(rows_of(bins))
     np.testing.assert_allclose(less.squares(), real(changed - bins, ones).T @ real(changed - bins, ones), atol=1e-12)
     full = real(bins @ parts, ones)
-    np.testing.assert_allclose(dense_rows(bins).select(parts).squares(), full.T @ full, atol=1e-12)
-    both = dense_rows(np.concatenate([bins, changed], axis=-1))
+    np.testing.assert_allclose(rows_of(bins).select(parts).squares(), full.T @ full, atol=1e-12)
+    both = rows_of(np.concatenate([bins, changed], axis=-1))
     places = np.arange(bins.shape[2], both.count)
-    np.testing.assert_array_equal(both.only(places).squares(), dense_rows(changed).squares())
+    np.testing.assert_array_equal(both.only(places).squares(), rows_of(changed).squares())
     sparse = sparse_bins(changed[..., 0]).less(sparse_bins(bins[..., 0]), C)
     out = np.zeros((C, M), complex)
     out[sparse.columns] = sparse.bins
@@ -72,7 +72,7 @@ def test_products_are_weighed_by_a_power_that_is_constant_in_a_band(bins, rng):
     by_band = 1.0 + rng.random((len(starts), C))
     power = np.repeat(by_band, np.diff([*starts, M]), axis=0)
     full = real(bins, np.sqrt(power))
-    squares = dense_rows(bins).squares_by_band(starts)
+    squares = rows_of(bins).squares_by_band(starts)
     np.testing.assert_allclose(squares.over(by_band), full.T @ full, atol=1e-12)
     some = np.arange(C) % 2 == 0
     part = real(bins[:, some], np.sqrt(power[:, some]))

@@ -34,6 +34,7 @@ from lhpost6_pin.identification.calibration.problem import Problem, ResidualBand
 from lhpost6_pin.identification.calibration.result import changed_parameters, contradictions
 from lhpost6_pin.identification.calibration.sensor_errors import corrected, corrected_record, sensor_unknowns
 from lhpost6_pin.identification.calibration.simulated_residuals import by_simulation
+from lhpost6_pin.identification.calibration.sparse_bins import sparse_bins
 from lhpost6_pin.identification.calibration.whitened_residuals import (
     Whitener,
     excess,
@@ -193,7 +194,7 @@ def test_whitened_noise_has_unit_power_and_no_correlation(test):
     noise = [[draw(t)[0] for _ in range(20)] for t in (0, 1)]
     f = draw(0)[1]
     whitener = make_whitener(noise, [f, f], np.array([0.0, 0.01, 10.0, 20.0, 30.0]))
-    white = [whitener.apply(test, draw(test)[0][..., None], f)[..., 0] for _ in range(20)]  # others than it is from
+    white = [whitener.apply(test, sparse_bins(draw(test)[0]), f).full(3) for _ in range(20)]  # others than it is from
     others = np.vstack([x[f > 0] for x in white])
     matrix = others.conj().T @ others / len(others)
     assert np.allclose(matrix, np.eye(3), atol=0.06)  # 9 600 bins: entries scatter by 1 %, their estimate as much
@@ -237,8 +238,10 @@ def test_columns_that_are_zero_are_whitened_as_all_others():
     whitener = make_whitener([[noise]], [f], np.array([0.0, 5.0, 10.0]))
     bins = rng.standard_normal((300, 5, 2)) * np.array([0, 1, 0, 1, 0])[:, None] + 0j
     whole = np.array([whitener.factor[0, b] @ x for b, x in zip(whitener.band(f), bins, strict=True)])
-    assert np.allclose(whitener.apply(0, bins, f), whole, rtol=1e-12, atol=1e-12)
-    assert not whitener.apply(0, 0.0 * bins, f).any()
+    found = whitener.apply(0, sparse_bins(bins), f)
+    np.testing.assert_array_equal(found.columns, [1, 2, 3, 4])  # none before the first is mixed with it
+    assert np.allclose(found.full(5), whole, rtol=1e-12, atol=1e-12)
+    assert not whitener.apply(0, sparse_bins(0.0 * bins), f).columns.size
 
 
 # ------------------------------------------------------------------------------------------------------- errors

@@ -78,13 +78,14 @@ from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.evaluate import advance_states, apply_forces
 from lhpost6_pin.effects.table import effect_table
 from lhpost6_pin.identification.calibration import calibration_numbers, fit
-from lhpost6_pin.identification.calibration.bin_rows import BinRows, dense_rows, row_by_column
+from lhpost6_pin.identification.calibration.bin_rows import BinRows, bin_rows, row_by_column
 from lhpost6_pin.identification.calibration.fit import objective_at, solve
 from lhpost6_pin.identification.calibration.normal_equations import bounded_step, bounds_of
 from lhpost6_pin.identification.calibration.operating_point import OperatingPoint
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
 from lhpost6_pin.identification.calibration.problem import Problem
 from lhpost6_pin.identification.calibration.sensor_errors import corrected_record
+from lhpost6_pin.identification.calibration.sparse_bins import sparse_bins
 from lhpost6_pin.identification.inverse_dynamics import leg_wrenches
 from lhpost6_pin.identification.validation import validate
 from lhpost6_pin.identification.validation.prepare_tests import validation_numbers
@@ -119,6 +120,11 @@ def background(slopes: np.ndarray, rest: np.ndarray, place: np.ndarray, bound: n
 def rows_of(slopes: np.ndarray) -> BinRows:
     """Rows (rows, p) of one column of the residuals."""
     return BinRows(slopes.shape[1], [(np.arange(slopes.shape[1]), slopes.T)])
+
+
+def all_rows(bins: np.ndarray) -> BinRows:
+    """Rows of bins (m, c, p)."""
+    return bin_rows([sparse_bins(bins)], bins.shape[1])
 
 
 def block_in(slopes: np.ndarray, columns: np.ndarray, rest: np.ndarray) -> Block:
@@ -191,7 +197,7 @@ def test_columns_evaluated_together_are_the_derivatives_of_each_alone(ready, fam
             size[i] = shape.typical
             plant = make_plant(one.on(problem.machine, tuple(size.tolist())))
             change, _ = problem.change(base, plant, one.family.shows_in)
-            direct = problem.whitened(0, change[..., None])[..., 0] / shape.typical
+            direct = problem.whitened(0, change).full(sum(problem.widths)) / shape.typical
             # forward dynamics and its inverse, and a quieted path marched with other states beside it: rounding
             row = row_by_column(direct, np.ones(direct.shape))
             np.testing.assert_allclose(columns.times(part[:, i]), row, rtol=0.0, atol=1e-6 * np.abs(row).max())
@@ -280,12 +286,12 @@ def test_noise_in_a_candidate_s_column_is_taken_off_its_equations():
     def seen() -> tuple[Block, Block]:
         """Equations as measured, and corrected by two replicas, which are what was measured with more noise."""
         (s, k, r), more = (x + y for x, y in zip((slope, column, rest), noise(), strict=True)), [noise(), noise()]
-        changes = [([dense_rows(a)], [row_by_column(d, root)]) for a, _, d in more]
+        changes = [([all_rows(a)], [row_by_column(d, root)]) for a, _, d in more]
         nothing = np.zeros((1, p, p)), np.zeros((1, p)), np.zeros(p), np.zeros(p)
-        known = Background([dense_rows(s)], [row_by_column(r, root)], [root], *nothing, changes)
-        measured = [dense_rows(k)]
+        known = Background([all_rows(s)], [row_by_column(r, root)], [root], *nothing, changes)
+        measured = [all_rows(k)]
         block = make_block(known, measured)
-        return block, less_noise(known, block, measured, [[dense_rows(k + b)] for _, b, _ in more])
+        return block, less_noise(known, block, measured, [[all_rows(k + b)] for _, b, _ in more])
 
     plain, mended = [], []
     for _ in range(draws):
@@ -302,9 +308,9 @@ def test_a_column_of_nothing_but_noise_keeps_half_of_its_square():
     nothing = np.zeros((1, 1, 1)), np.zeros((1, 1)), np.zeros(1), np.zeros(1), [([none], [rest])]
     known = Background([none], [rest], [np.ones((3, 1))], *nothing)
     bins = np.ones((3, 1, 1), complex)
-    column = [dense_rows(bins)]
+    column = [all_rows(bins)]
     block = make_block(known, column)
-    assert less_noise(known, block, column, [[dense_rows(3.0 * bins)]]).own[0, 0, 0] == pytest.approx(
+    assert less_noise(known, block, column, [[all_rows(3.0 * bins)]]).own[0, 0, 0] == pytest.approx(
         0.5 * block.own[0, 0, 0]
     )
 
@@ -874,8 +880,9 @@ def test_a_residual_function_has_the_size_of_the_force_that_is_missing(found):
         force = np.zeros((len(x), len(base.plant.machine.components)))
         force[:, leg] = size * np.sin(2.0 * np.pi * waves * (x - first) / (last - first))
         wrench = leg_wrenches(base.plant, plant_motion(base.plant, test.motion).q, force).sum(axis=1)
-        bins = problem.whitener.apply(t, problem.of_wrench(t, wrench[..., None]), problem.frequency[t])[..., 0]
-        rest.append(search.solution.normal.residual[t] + bins)
+        bins = problem.whitener.apply(t, problem.of_wrench(t, wrench[..., None]), problem.frequency[t])
+        before = search.solution.normal.residual[t]
+        rest.append(before + bins.full(before.shape[1])[..., 0])
     normal = copy.copy(search.solution.normal)
     normal.residual = rest
     linear = linearise(search.solution._replace(normal=normal, residual=rest), search.calibration)

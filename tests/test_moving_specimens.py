@@ -12,6 +12,7 @@ from lhpost6_pin.core.errors import SimulationError
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.identification.calibration import calibration_numbers
 from lhpost6_pin.identification.calibration.prepare import as_simulated, prepare_problem
+from lhpost6_pin.identification.calibration.sparse_bins import sparse_bins
 from lhpost6_pin.identification.prepare import AS_RECORDED, prepare_test
 from lhpost6_pin.identification.residuals import evaluate_residuals, follow
 from lhpost6_pin.machine.machine import load_machine
@@ -101,7 +102,7 @@ def test_a_table_with_a_specimen_that_moves_is_calibrated_with_it_locked_and_its
 
     def misfit(test):
         bins, frequency = problem.bins(evaluate_residuals(plant, test, problem.kinds), test)
-        white = problem.whitener.apply(0, bins[..., None], frequency)[..., 0]
+        white = problem.whitener.apply(0, sparse_bins(bins), frequency).full(bins.shape[1])
         return float(np.mean(np.abs(white) ** 2))
 
     (test,) = problem.tests

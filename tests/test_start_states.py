@@ -17,6 +17,7 @@ from lhpost6_pin.effects.registry import law_of, states_of
 from lhpost6_pin.identification.calibration import calibration_numbers
 from lhpost6_pin.identification.calibration.operating_point import OperatingPoint
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
+from lhpost6_pin.identification.calibration.sparse_bins import sparse_bins
 from lhpost6_pin.identification.calibration.start_states import no_start_states, start_states
 from lhpost6_pin.identification.decompose.agreement import find_agreement
 from lhpost6_pin.identification.decompose.record import decompose_record
@@ -62,7 +63,7 @@ def test_what_remains_is_the_residual_of_the_estimate_with_the_states_as_unknown
     change[:, 1] = 0.0  # a column in which the states do not show
     known, target = np.vstack([real_rows(change), np.eye(3)]), np.vstack([real_rows(bins), np.zeros((3, 3))])
     least = np.sum((target - known @ np.linalg.lstsq(known, target, rcond=None)[0]) ** 2, axis=0)
-    remains = start_states(change).less(bins)
+    remains = start_states(sparse_bins(change)).less(sparse_bins(bins)).full(4)
     np.testing.assert_allclose([power(remains[..., k]) for k in range(3)], least, rtol=1e-9)
     np.testing.assert_array_equal(remains[:, 1], bins[:, 1])
 
@@ -71,17 +72,27 @@ def test_weights_that_change_scale_what_remains():
     rng = np.random.default_rng(1)
     change, bins = (rng.standard_normal((12, 4, 3)) + 1j * rng.standard_normal((12, 4, 3)) for _ in range(2))
     scale = rng.uniform(0.5, 2.0, (12, 4))
-    states = start_states(change)
-    again = states.scaled(scale).less(bins * scale[..., None])
-    np.testing.assert_allclose(again, states.less(bins) * scale[..., None], rtol=0.0, atol=1e-12)  # rounding
+    states, seen = start_states(sparse_bins(change)), sparse_bins(bins * scale[..., None])
+    again, remains = (one.full(4) for one in (states.scaled(scale).less(seen), states.less(sparse_bins(bins))))
+    np.testing.assert_allclose(again, remains * scale[..., None], rtol=0.0, atol=1e-12)  # rounding
+
+
+def test_columns_in_which_no_state_shows_are_left_as_they_are():
+    rng = np.random.default_rng(2)
+    change, bins = (rng.standard_normal((12, 4, 3)) + 0j for _ in range(2))
+    change[:, :2], bins[:, 2:] = 0.0, 0.0
+    some = sparse_bins(bins)
+    assert start_states(sparse_bins(change)).less(some) is some
+    bins[:, 3] = 1.0  # in one column of theirs: what remains is in both
+    np.testing.assert_array_equal(start_states(sparse_bins(change)).less(sparse_bins(bins)).columns, [0, 1, 2, 3])
 
 
 def test_a_test_without_forces_is_left_as_it_is(base):
     test = without_forces(base.tests[0])
     assert start_wrenches(base.plant, test)[0].shape == (test.samples, 6, 0)
     assert not estimate_start(base.plant, test, 30.0).any()
-    bins = np.ones((7, 3, 1), complex)
-    assert no_start_states(7).less(bins) is bins
+    some = sparse_bins(np.ones((7, 3, 1), complex))
+    assert no_start_states().less(some) is some
 
 
 def without_forces(test):
@@ -105,13 +116,15 @@ def test_what_seals_and_pads_hold_at_the_start_is_no_residual(problem, base, sha
     plant, test = base.plant, base.tests[0]
     after = evaluate_residuals(plant, test, problem.kinds, path=follow(plant, test, start=drawn(plant, share)))
     change = problem.bins(after, test)[0] - problem.bins(base.residuals[0], test)[0]
-    white = problem.whitener.apply(0, change[..., None], problem.frequency[0])
-    remains = problem.whitened(0, change[..., None])
-    assert power(white) > 30.0 * share**2
-    assert power(remains) < 0.05 * power(white) + 3.0 * share**2  # priors allow for one deviation of every state
+    white = problem.whitener.apply(0, sparse_bins(change), problem.frequency[0])
+    remains = problem.whitened(0, sparse_bins(change))
+    assert power(white.bins) > 30.0 * share**2
+    assert (
+        power(remains.bins) < 0.05 * power(white.bins) + 3.0 * share**2
+    )  # priors allow for one deviation of every state
     rng = np.random.default_rng(2)
-    noise = rng.standard_normal(white.shape) + 1j * rng.standard_normal(white.shape)
-    assert power(problem.starts[0].less(noise)) > 0.99 * power(noise)
+    noise = sparse_bins(rng.standard_normal(change.shape) + 1j * rng.standard_normal(change.shape))
+    assert power(problem.starts[0].less(noise).bins) > 0.99 * power(noise.bins)
 
 
 def full(plant):

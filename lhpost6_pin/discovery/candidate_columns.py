@@ -5,15 +5,16 @@ force has a wrench of its own, a modifier of an actuator's oil or valve acts on 
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
-from ..core.arrays import Array, Complex
+from ..core.arrays import Array
 from ..effects.registry import LAWS
-from ..identification.calibration.bin_rows import BinRows, dense_rows
+from ..identification.calibration.bin_rows import BinRows, bin_rows
 from ..identification.calibration.operating_point import OperatingPoint
 from ..identification.calibration.problem import Problem
+from ..identification.calibration.sparse_bins import SparseBins
 from ..identification.inverse_dynamics import with_loads
 from ..identification.prepare import actuator_forces
 from ..identification.residual_kernels import row_wrenches
@@ -40,21 +41,22 @@ def columns_of_groups(
 ) -> tuple[list[BinRows], list[list[Array]]]:
     """Columns of several such groups side by side; and the combinations (k, q) of them by group."""
     each, parts = zip(*(_bins_of(problem, base, group) for group in groups), strict=True)
-    columns = whitened_rows(problem, [np.concatenate(bins, axis=2) for bins in zip(*each, strict=True)])
-    ends = np.cumsum([0, *(bins[0].shape[2] for bins in each)])
+    columns = whitened_rows(problem, [list(chain(*pieces)) for pieces in zip(*each, strict=True)])
+    ends = np.cumsum([0, *(len(own[0]) for own in parts)])
     rows = np.eye(ends[-1])
     return columns, [[rows[:, a:b] @ part for part in own] for (a, b), own in zip(pairwise(ends), parts, strict=True)]
 
 
-def whitened_rows(problem: Problem, bins: Sequence[Complex]) -> list[BinRows]:
-    """Rows, whitened as residuals are, of bins (m, c, k) of every test."""
-    return [dense_rows(problem.whitened(t, own)) for t, own in enumerate(bins)]
+def whitened_rows(problem: Problem, pieces: Sequence[Sequence[SparseBins]]) -> list[BinRows]:
+    """Rows of every test, whitened as residuals are, of its bins in pieces."""
+    count = sum(problem.widths)
+    return [bin_rows([problem.whitened(t, one) for one in own], count) for t, own in enumerate(pieces)]
 
 
 def _bins_of(
     problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]
-) -> tuple[list[Complex], list[Array]]:
-    """Bins (m, c, k) of every test by the amplitudes of one group; and each candidate's combination (k, q) of them."""
+) -> tuple[list[list[SparseBins]], list[Array]]:
+    """Bins of every test by k amplitudes of one group, in pieces; and each candidate's combination (k, q) of them."""
     machine, first = base.plant.machine, candidates[0]
     whole = first.on(machine, tuple(s.typical for s in first.amplitudes))
     (law,) = (LAWS[effect.law] for effect in whole.added_effects if effect.name == first.name)
@@ -69,7 +71,7 @@ def _bins_of(
         bins = _by_actuator(problem, base, first.at(tuple(alone)))
     else:
         each = zip(*(_by_difference(problem, base, c) for c in candidates), strict=True)
-        bins = [np.concatenate(parts, axis=2) for parts in each]
+        bins = [list(chain(*pieces)) for pieces in each]
     if summed:
         return bins, [np.array([[float(name in c.components)] for name in alone]) for c in candidates]
     ends = np.cumsum([0, *(len(c.amplitudes) for c in candidates)])
@@ -77,13 +79,13 @@ def _bins_of(
     return bins, [places[:, a:b] for a, b in pairwise(ends)]
 
 
-def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[Complex]:
-    """Change of the residuals by each amplitude of a candidate."""
+def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[list[SparseBins]]:
+    """Change of the residuals of every test by each amplitude of a candidate."""
     parts = []
     for size, one in _one_by_one(candidate):
         changes = problem.change(base, make_plant(candidate.on(base.plant.machine, one)), candidate.family.shows_in)
-        parts.append([c / size for c in changes])
-    return [np.stack(bins, axis=-1) for bins in zip(*parts, strict=True)]
+        parts.append([c._replace(bins=c.bins / size) for c in changes])
+    return [list(pieces) for pieces in zip(*parts, strict=True)]
 
 
 def _one_by_one(candidate: Candidate) -> list[tuple[float, tuple[float, ...]]]:
@@ -92,8 +94,8 @@ def _one_by_one(candidate: Candidate) -> list[tuple[float, tuple[float, ...]]]:
     return [(size, tuple(size * (k == i) for k in range(len(typical)))) for i, size in enumerate(typical)]
 
 
-def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> list[Complex]:
-    """Wrench of the force by each amplitude of each candidate, all in one machine.
+def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candidate]) -> list[list[SparseBins]]:
+    """Wrench of the force in every test by each amplitude of each candidate, all in one machine.
 
     Less than zero: it reduces what is required of the actuators.
     """
@@ -105,7 +107,7 @@ def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candi
     plant = make_plant(machine)
     place = {effect.name: i for i, effect in enumerate(machine.effects)}
     rows = plant.rows[np.isin(plant.rows["effect"], [place[name] for name in sizes])]
-    found: list[Complex] = []
+    found: list[list[SparseBins]] = []
     before, paths = base.with_ports_of(plant)
     for test, there in zip(base.tests, paths, strict=True):
         path = follow(plant, test, (before, there))
@@ -113,14 +115,15 @@ def _by_force(problem: Problem, base: OperatingPoint, candidates: Sequence[Candi
         z = path.z if force is None else with_loads(plant, path.ports, path.required, path.z, force)
         wrench = row_wrenches(plant, path.ports, z, rows)
         own = [wrench[:, rows["effect"] == place[name]].sum(axis=1) / -size for name, size in sizes.items()]
-        found.append(problem.of_wrench(len(found), np.stack(own, axis=-1)))
+        found.append([problem.of_wrench(len(found), np.stack(own, axis=-1))])
     return found
 
 
-def _by_actuator(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[Complex]:
-    """Change of the residuals by the amplitude on each actuator, from one evaluation."""
+def _by_actuator(problem: Problem, base: OperatingPoint, candidate: Candidate) -> list[list[SparseBins]]:
+    """Change of the residuals of every test by the amplitude on each actuator, from one evaluation."""
     size = candidate.amplitudes[0].typical
     changes = problem.change(base, make_plant(candidate.on(base.plant.machine, (size,))), candidate.family.shows_in)
     places = [base.plant.machine.actuator_names.index(name) for name in candidate.components]
-    rows = np.stack([problem.rows_of_actuator(place) for place in places], axis=-1)
-    return [c[..., None] * rows / size for c in changes]
+    rows = [problem.rows_of_actuator(place) for place in places]
+    scaled = [c._replace(bins=c.bins / size) for c in changes]
+    return [[one.some(own) for own in rows] for one in scaled]

@@ -14,7 +14,8 @@ from typing import Literal
 
 import numpy as np
 
-from ..core.arrays import Array, Complex
+from ..core.arrays import Array
+from ..identification.calibration.sparse_bins import SparseBins
 from ..identification.inverse_dynamics import leg_wrenches
 from ..laws.lines import filter_shares
 from ..laws.tabulated import NODES
@@ -105,9 +106,9 @@ def fit_residual_functions(found: Search, linear: Linearisation) -> tuple[Residu
         unit = leg_wrenches(base.plant, plant_motion(base.plant, test.motion).q, np.ones_like(moved[0]))
         motions.append((test, moved, unit))  # elongations and rates (n, legs), wrenches (n, legs, 6) of unit forces
 
-    def fitted(names: tuple[str, ...], bins: Sequence[Complex]) -> ResidualFunction:
-        """The function whose values have these columns (m, c, k) of each test."""
-        columns = whitened_rows(problem, bins)
+    def fitted(names: tuple[str, ...], bins: Sequence[SparseBins]) -> ResidualFunction:
+        """The function whose values have these bins (k, p, m) of each test."""
+        columns = whitened_rows(problem, [[one] for one in bins])
         one = score(background, make_block(background, columns), -free, free, spread)
         less = weigh.lowered(background.explained(columns, one.amplitude), one)
         return ResidualFunction(names, state, memory, nodes, one.amplitude, one.sd, *less[:2], one.held_out)
@@ -131,8 +132,13 @@ def fit_residual_functions(found: Search, linear: Linearisation) -> tuple[Residu
             ]
             functions += [fitted((name,), columns) for name, columns in zip(names, each, strict=True)]
             if len(members) > 1:
-                functions.append(fitted(names, [np.sum(parts, axis=0) for parts in zip(*each, strict=True)]))
+                functions.append(fitted(names, [_sum(parts) for parts in zip(*each, strict=True)]))
     return tuple(sorted(functions, key=lambda one: -one.gain))
+
+
+def _sum(parts: Sequence[SparseBins]) -> SparseBins:
+    """Sum of bins in the same columns."""
+    return parts[0]._replace(bins=np.sum([one.bins for one in parts], axis=0))
 
 
 def _states(numbers: Parameters) -> Iterator[tuple[State, float]]:

@@ -7,50 +7,15 @@ are summed column by column over the unknowns that show there, at a part of the 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.arrays import Array, Complex, Mask
 from ...core.compiled import compiled
+from .sparse_bins import SparseBins
 
-__all__ = [
-    "BandSquares",
-    "BinRows",
-    "SparseBins",
-    "bin_rows",
-    "dense_rows",
-    "over",
-    "row_by_column",
-    "sparse_bins",
-    "squares_of",
-]
-
-
-class SparseBins(NamedTuple):
-    """Bins of one quantity in the columns of the residuals in which it is not zero."""
-
-    columns: NDArray[np.intp]  # (k,)
-    bins: Complex  # (k, m)
-
-    def times(self, scale: Array) -> "SparseBins":
-        """Its bins scaled (m, c)."""
-        return self._replace(bins=self.bins * scale.T[self.columns])
-
-    def less(self, other: "SparseBins", count: int) -> "SparseBins":
-        """Difference to another one, of `count` columns in all."""
-        both = np.zeros((count, self.bins.shape[1]), np.complex128)
-        both[self.columns] = self.bins
-        both[other.columns] -= other.bins
-        columns = np.union1d(self.columns, other.columns)
-        return SparseBins(columns, both[columns])
-
-
-def sparse_bins(bins: Complex) -> SparseBins:
-    """The columns of bins (m, c) that are not zero."""
-    columns = np.flatnonzero(bins.any(axis=0))
-    return SparseBins(columns, np.ascontiguousarray(bins.T[columns]))
+__all__ = ["BandSquares", "BinRows", "bin_rows", "over", "row_by_column", "squares_of"]
 
 
 @dataclass(frozen=True)
@@ -167,29 +132,30 @@ def _less(one: tuple[NDArray[np.intp], Array], other: tuple[NDArray[np.intp], Ar
 
 
 def bin_rows(quantities: Sequence[SparseBins], columns: int) -> BinRows:
-    """Rows of several quantities."""
+    """Rows of quantities, each of which may be several."""
     members: list[list[int]] = [[] for _ in range(columns)]
     values: list[list[Complex]] = [[] for _ in range(columns)]
-    for i, (own, bins) in enumerate(quantities):
-        for k, column in enumerate(own.tolist()):
-            members[column].append(i)
+    count, width = 0, quantities[0].bins.shape[-1] if quantities else 0
+    for one in quantities:
+        bins = one.bins.reshape(len(one.columns), -1, width) if len(one.columns) else one.bins[:0]
+        several = one.bins.shape[1] if one.bins.ndim > 2 else 1
+        for k, column in enumerate(one.columns.tolist()):
+            members[column] += range(count, count + several)
             values[column].append(bins[k])
-    width = quantities[0].bins.shape[1] if quantities else 0
+        count += several
     pairs = zip(members, values, strict=True)
-    return BinRows(len(quantities), [(np.array(own, np.intp), _part(bins, len(own), width)) for own, bins in pairs])
+    return BinRows(count, [(np.array(own, np.intp), _part(bins, len(own), width)) for own, bins in pairs])
 
 
-def _part(bins: Sequence[Complex] | Complex, count: int, width: int) -> Array:
-    """Real rows (a, 2 m) of `count` bins (m,) each."""
-    both = np.asarray(bins, np.complex128).reshape(count, width) * np.sqrt(2.0)
-    return np.hstack([both.real, both.imag])
-
-
-def dense_rows(bins: Complex) -> BinRows:
-    """Rows of the quantities of bins (m, c, p)."""
-    used = [np.flatnonzero(some) for some in np.any(bins, axis=0)]
-    parts = [(own, _part(bins[:, c, own].T, len(own), len(bins))) for c, own in enumerate(used)]
-    return BinRows(bins.shape[2], parts)
+def _part(bins: Sequence[Complex], count: int, width: int) -> Array:
+    """Real rows (a, 2 m) of `count` quantities' bins, in pieces (p, m)."""
+    out, first = np.empty((count, 2 * width)), 0
+    for piece in bins:
+        last = first + len(piece)
+        out[first:last, :width], out[first:last, width:] = piece.real, piece.imag
+        first = last
+    out *= np.sqrt(2.0)
+    return out
 
 
 def row_by_column(bins: Complex, root: Array) -> Array:

@@ -10,9 +10,10 @@ from ...core.arrays import Array, Complex, Mask
 from ...core.progress import Progress
 from ...core.threads import by_threads
 from ...machine.parameters import Parameters
-from .bin_rows import BandSquares, BinRows, SparseBins, bin_rows, row_by_column
+from .bin_rows import BandSquares, BinRows, bin_rows, row_by_column
 from .operating_point import OperatingPoint
 from .problem import Problem, Slopes
+from .sparse_bins import SparseBins
 from .whitened_residuals import excess
 
 __all__ = ["NoiseBias", "NormalEquations", "bounded_step", "bounds_of", "positive"]

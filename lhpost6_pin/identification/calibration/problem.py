@@ -23,13 +23,13 @@ from ..friction_start import start_wrenches
 from ..prepare import MeasuredTest
 from ..residual_change import Evaluated, change_of
 from ..residuals import RESIDUALS, Residuals, evaluate_residuals, follow, kinds_shown
-from .bin_rows import SparseBins, sparse_bins
 from .derivative_steps import derivative_steps
 from .free_parameters import FreeParameter, parameter_changes
 from .operating_point import OperatingPoint
 from .parameters_of_tests import parameters_of_tests
 from .scale import find_scale, without_held
 from .sensor_errors import RemovedDelay, SensorUnknown, corrected, sensor_unknowns
+from .sparse_bins import SparseBins, sparse_bins
 from .start_states import StartStates, no_start_states, start_states
 from .whitened_residuals import make_whitener, spectrum_of
 
@@ -230,18 +230,19 @@ class Problem:
         return list(by_threads(of_one, range(len(self.tests)), self.jobs))
 
     def _whitened(self, test: int, bins: Complex) -> Complex:
-        return self.whitened(test, bins[..., None])[..., 0]
+        """Whitened bins (m, c) of a test's `bins` (m, c)."""
+        return self.whitened(test, sparse_bins(bins)).full(bins.shape[1])
 
-    def whitened(self, test: int, bins: Complex) -> Complex:
-        """Whitened bins (m, c, p) of a test's `bins`, less what friction's state at its start explains."""
-        return self.starts[test].less(self.whitener.apply(test, bins, self.frequency[test]))
+    def whitened(self, test: int, some: SparseBins) -> SparseBins:
+        """Whitened bins of a test's, less what friction's state at its start explains."""
+        return self.starts[test].less(self.whitener.apply(test, some, self.frequency[test]))
 
     def _starts(self, plant: Plant, test: int) -> StartStates:
         """How friction's states at the start of a test move its whitened bins."""
         (wrench, _), f = start_wrenches(plant, self.tests[test]), self.frequency[test]
         if not wrench.shape[2]:
-            return no_start_states(len(f))
-        return start_states(self.whitener.apply(test, self.comparison.held * self.of_wrench(test, wrench), f))
+            return no_start_states()
+        return start_states(self.whitener.apply(test, self.of_wrench(test, self.comparison.held * wrench), f))
 
     def slopes(self, base: OperatingPoint, free: Mask, progress: Callable[[float], None]) -> list[Slopes]:
         """Derivatives of the whitened bins of every test by the unknowns in `free` (p,), by differences."""
@@ -270,11 +271,12 @@ class Problem:
         out = []
         for i, place in group.members:
             if free[i]:
-                rows = np.ones(sum(self.widths), bool)
+                own = changes
                 if place >= 0:
                     rows = self.rows("gas", place) if group.residuals == ("gas",) else self.rows_of_actuator(place)
-                slopes = [np.where(rows, c, 0.0) / step[i] for c in changes]
-                out.append((i, [sparse_bins(self._whitened(t, slope)) for t, slope in enumerate(slopes)]))
+                    own = [change.some(rows) for change in changes]
+                slopes = (one._replace(bins=one.bins / step[i]) for one in own)
+                out.append((i, [self.whitened(t, slope) for t, slope in enumerate(slopes)]))
         return out
 
     def change(
@@ -283,8 +285,8 @@ class Problem:
         plant: Plant,
         residuals: tuple[str, ...],
         tests: Sequence[MeasuredTest] | None = None,
-    ) -> list[Complex]:
-        """Bins (m, c) by which residuals of some kinds differ from the base's, with another plant or other tests."""
+    ) -> list[SparseBins]:
+        """Bins by which every test's residuals of some kinds differ from the base's, with another plant or tests."""
         kinds = tuple(k for k in kinds_shown(residuals, self.tests[0].channels) if k in self.kinds)
         changes = []
         known, paths = base.with_ports_of(plant)
@@ -292,7 +294,7 @@ class Problem:
             same = test.motion is base.tests[k].motion
             path = follow(plant, test, (known, paths[k]) if same else None)
             before = Evaluated(known, base.tests[k], paths[k], base.residuals[k])
-            changes.append(self.bins(change_of(before, plant, test, path, kinds), test)[0])
+            changes.append(self._some_bins(change_of(before, plant, test, path, kinds), test)[0])
         return changes
 
     def plant_at(self, x: Array, near: OperatingPoint | None = None) -> Plant:
@@ -306,29 +308,29 @@ class Problem:
 
     def bins(self, residuals: Residuals, test: MeasuredTest) -> tuple[Complex, Array]:
         """Bins (m, c) of a test's stacked residuals, zero for those that have no columns here, or that guides take."""
-        c = self.comparison
+        some, f = self._some_bins(residuals, test)
+        return some.full(sum(self.widths)), f
+
+    def _some_bins(self, residuals: Residuals, test: MeasuredTest) -> tuple[SparseBins, Array]:
+        """Bins (k, m) of a test's residuals in the columns that are not zero."""
         free = (np.arange(residuals.wrench.shape[1])[:, None] == self.axes).any(axis=1)
         weight = free if test.weight is None else test.weight[:, None] * free
-        residuals = residuals._replace(wrench=residuals.wrench * weight)
-        bins, f = spectrum_of(residuals.stacked(), test.dt, c.bands[0], c.bands[-1], c.edge)
-        given = np.repeat([part.shape[1] > 0 for part in residuals], self.widths)
-        if given.all():
-            return bins, f
-        out = np.zeros((len(f), len(given)), np.complex128)
-        out[:, given] = bins
-        return out, f
+        stacked = residuals._replace(wrench=residuals.wrench * weight).stacked()
+        used = stacked.any(axis=0)
+        columns = np.flatnonzero(np.repeat([part.shape[1] > 0 for part in residuals], self.widths))[used]
+        c = self.comparison
+        bins, f = spectrum_of(stacked[:, used], test.dt, c.bands[0], c.bands[-1], c.edge)
+        return SparseBins(columns, bins.T), f
 
-    def of_wrench(self, test: int, wrench: Array) -> Complex:
-        """Bins (m, c, k) of changes of a test's wrench residual (n, 6, k)."""
+    def of_wrench(self, test: int, wrench: Array) -> SparseBins:
+        """Bins (k, p, m) of p changes of a test's wrench residual (n, 6, p)."""
         n, _, count = wrench.shape
         c = self.comparison
         weight = self.tests[test].weight
         free = wrench[:, self.axes].reshape(n, -1)
         weighed = free if weight is None else free * weight[:, None]
         bins, f = spectrum_of(weighed, self.tests[test].dt, c.bands[0], c.bands[-1], c.edge)
-        out = np.zeros((len(f), sum(self.widths), count), np.complex128)
-        out[:, self.rows("wrench")] = bins.reshape(len(f), -1, count)
-        return out
+        return SparseBins(np.flatnonzero(self.rows("wrench")), bins.T.reshape(-1, count, len(f)))
 
     def rows_of_actuator(self, place: int) -> Mask:
         """Mask of the stacked residuals' columns of one actuator."""

@@ -20,12 +20,13 @@ from ...mechanics.plant import Plant, State, make_plant
 from ...mechanics.pose import platen_motion
 from ...simulation.simulate import OpenLoop, Run, fastest_engine, simulate
 from ..prepare import MeasuredTest
-from .bin_rows import dense_rows, row_by_column
+from .bin_rows import bin_rows, row_by_column
 from .free_parameters import with_parameters
 from .prepare import as_simulated
 from .problem import Problem
 from .result import Subset
 from .sensor_errors import corrected
+from .sparse_bins import sparse_bins
 from .whitened_residuals import excess, make_whitener, spectrum_of
 
 __all__ = ["by_simulation"]
@@ -89,13 +90,13 @@ def by_simulation(
     frequency = [_bins(d, d.measured, problem, band)[1] for d in drives]
     noise = [[more - rest[t] for more in drawn[t::tests]] for t in range(tests)]
     whitener = make_whitener(noise, frequency, np.array(band))
-    white = [whitener.apply(t, rest[t][..., None], f)[..., 0] for t, f in enumerate(frequency)]
+    white = [whitener.apply(t, sparse_bins(rest[t]), f).full(rest[t].shape[1]) for t, f in enumerate(frequency)]
     power = excess(whitener, white, frequency)
     matrix, side = np.diag(prior**-2.0), x[:count] / prior**2
     for t, f in enumerate(frequency):
         slope = np.stack([(m[t] - rest[t]) / h for m, h in zip(moved, step, strict=True)], axis=-1)
         root = np.sqrt(power[t])
-        rows = dense_rows(whitener.apply(t, slope, f)).weighed(root)
+        rows = bin_rows([whitener.apply(t, sparse_bins(slope), f)], slope.shape[1]).weighed(root)
         matrix, side = matrix + rows.squares(), side + rows.dot(row_by_column(white[t], root))
     covariance = np.linalg.inv(matrix)
     sd = np.sqrt(np.diag(covariance))

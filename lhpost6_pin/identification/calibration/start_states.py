@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.arrays import Array, Complex
+from .sparse_bins import SparseBins
 
 __all__ = ["StartStates", "no_start_states", "start_states"]
 
@@ -20,48 +21,51 @@ LEAST = 0.1
 
 
 class StartStates(NamedTuple):
-    """Directions in which states at the start of a test move its whitened bins, in k columns of the residuals."""
+    """Directions in which states at the start of a test move its whitened bins, in k columns of the residuals.
+
+    Real and imaginary parts alternate: products of them take half the work of complex ones.
+    """
 
     columns: NDArray[np.intp]  # (k,) those in which directions are not zero
-    directions: Array  # (2, m, k, s) real and imaginary parts
-    duals: Array  # (2, m, k, s): their products with the directions are one or zero
+    directions: Array  # (s, 2 k m)
+    duals: Array  # (s, 2 k m): their products with the directions are one or zero
     removed: Array  # (s,) share of what lies along each
 
-    def less(self, bins: Complex) -> Complex:
-        """Whitened bins (m, c, p) less what states at the start explain of them."""
-        own, count = _parts(bins[:, self.columns]), len(self.removed)
-        if not (count and own.any()):
-            return bins
-        flat = own.reshape(-1, bins.shape[2])
-        along = (self.duals.reshape(-1, count).T @ flat) * self.removed[:, None]
-        flat -= self.directions.reshape(-1, count) @ along
-        out = bins.copy()
-        out.real[:, self.columns], out.imag[:, self.columns] = own
-        return out
+    def less(self, some: SparseBins) -> SparseBins:
+        """Whitened bins less what states at the start explain of them."""
+        if not (len(self.removed) and np.isin(self.columns, some.columns).any()):
+            return some
+        columns, bins = np.union1d(self.columns, some.columns), some.bins
+        out = np.zeros((len(columns), *bins.shape[1:]), np.complex128)
+        out[np.searchsorted(columns, some.columns)] = bins
+        places = np.searchsorted(columns, self.columns)
+        own = out[places].reshape(len(places), -1, bins.shape[-1]).swapaxes(0, 1)
+        flat = _parts(own)
+        flat -= ((flat @ self.duals.T) * self.removed) @ self.directions
+        out[places] = flat.view(np.complex128).reshape(own.shape).swapaxes(0, 1).reshape(out[places].shape)
+        return SparseBins(columns, out)
 
     def scaled(self, scale: Array) -> "StartStates":
         """The same for whitened bins that are larger by a scale (m, c)."""
-        own = scale[:, self.columns, None]
+        own = np.repeat(scale.T[self.columns].ravel(), 2)
         return self._replace(directions=self.directions * own, duals=self.duals / own)
 
 
-def _parts(x: Complex) -> Array:
-    """Real and imaginary parts (2, ...): products of them take half the work of complex ones."""
-    return np.array([x.real, x.imag])  # in C order, so that a reshaped one is a view
+def _parts(bins: Complex) -> Array:
+    """Real and imaginary parts (p, 2 k m) of bins (p, k, m)."""
+    return np.ascontiguousarray(bins).view(np.float64).reshape(len(bins), -1)
 
 
-def start_states(whitened: Complex) -> StartStates:
-    """Directions of a test by whitened bins (m, c, k) of one prior deviation of each of k states."""
-    columns = np.flatnonzero(whitened.any(axis=(0, 2)))
-    flat = whitened[:, columns].reshape(-1, whitened.shape[2])
-    squares, turned = np.linalg.eigh((flat.conj().T @ flat).real)
+def start_states(whitened: SparseBins) -> StartStates:
+    """Directions of a test by whitened bins (k, p, m) of one prior deviation of each of p states."""
+    flat = _parts(whitened.bins.swapaxes(0, 1))
+    squares, turned = np.linalg.eigh(flat @ flat.T)
     seen = squares > LEAST**2
-    directions = flat @ (turned[:, seen] / np.sqrt(squares[seen]))
-    directions = _parts(directions.reshape(len(whitened), len(columns), int(seen.sum())))
-    return StartStates(columns, directions, directions, 1.0 - 1.0 / np.sqrt(1.0 + squares[seen]))
+    directions = (turned[:, seen] / np.sqrt(squares[seen])).T @ flat
+    return StartStates(whitened.columns, directions, directions, 1.0 - 1.0 / np.sqrt(1.0 + squares[seen]))
 
 
-def no_start_states(bins: int) -> StartStates:
-    """Of a test without friction, or without forces, of so many bins."""
-    none = np.zeros((2, bins, 0, 0))
+def no_start_states() -> StartStates:
+    """Of a test without friction, or without forces."""
+    none = np.zeros((0, 0))
     return StartStates(np.zeros(0, np.intp), none, none, np.zeros(0))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...core.arrays import Array, Complex
 from ...core.errors import RecordError
+from .sparse_bins import SparseBins
 
 __all__ = ["Whitener", "excess", "make_whitener", "mean_squares", "spectrum_of"]
 __all__ += ["negative_log_likelihood"]
@@ -36,10 +37,11 @@ def spectrum_of(x: Array, dt: float, low: float, high: float, edge: float) -> tu
     cut = round(edge / dt)
     n = fft.prev_fast_len(len(x) - 2 * cut, real=True)
     f = fft.rfftfreq(n, dt)
-    inside = (f >= low) & (f <= high)
-    out = fft.rfft(x[cut : cut + n], axis=0)[inside] * np.sqrt(2.0 * dt / n)
-    out[f[inside] == 0.0] /= np.sqrt(2.0)
-    return out, f[inside]
+    first, last = np.searchsorted(f, low), np.searchsorted(f, high, side="right")
+    out = fft.rfft(x[cut : cut + n].T)[:, first:last] * np.sqrt(2.0 * dt / n)
+    if first == 0:
+        out[:, 0] /= np.sqrt(2.0)
+    return out.T, f[first:last]
 
 
 class Whitener(NamedTuple):
@@ -63,16 +65,17 @@ class Whitener(NamedTuple):
         """The same with whitened columns (t, b, k) times larger."""
         return self._replace(factor=scale[..., None] * self.factor)
 
-    def apply(self, test: int, bins: Complex, f: Array) -> Complex:
-        """Whitened bins, shape (m, k, p) of a test's `bins` at f (m,): noise in them has unit power, uncorrelated."""
-        out = np.empty_like(bins)
-        first = self.starts(f)
-        used = np.flatnonzero(bins.any(axis=(0, 2)))
-        for b, low, high in zip(self.band(f)[first], first, (*first[1:], len(f)), strict=True):
-            part = bins[low:high, used]
-            mixed = self.factor[test, b][:, used] @ part.swapaxes(0, 1).reshape(len(used), len(part) * bins.shape[2])
-            out[low:high] = mixed.reshape(len(mixed), len(part), bins.shape[2]).swapaxes(0, 1)
-        return out
+    def apply(self, test: int, some: SparseBins, f: Array) -> SparseBins:
+        """Whitened bins of a test's at f (m,), in the columns that show them: noise has unit power, uncorrelated."""
+        every, m = self.factor[test][:, :, some.columns], len(f)
+        columns = np.flatnonzero((every != 0.0).any(axis=(0, 2)))
+        bins = some.bins.reshape(len(some.columns), some.bins.size // max(len(some.columns) * m, 1), m)
+        out, first = np.empty((len(columns), *bins.shape[1:]), np.complex128), self.starts(f)
+        for b, low, high in zip(self.band(f)[first], first, (*first[1:], m), strict=True):
+            part = bins[:, :, low:high]
+            mixed = every[b][columns] @ part.reshape(len(part), part[0].size if len(part) else 0)
+            out[:, :, low:high] = mixed.reshape(len(columns), *part.shape[1:])
+        return SparseBins(columns, out.reshape(len(columns), *some.bins.shape[1:]))
 
 
 def _band(edges: Array, f: Array) -> NDArray[np.intp]:

@@ -133,11 +133,14 @@ def align(signal: ArrayLike, delay: ArrayLike, dt: float) -> Array:
     tau = np.broadcast_to(np.asarray(delay, dtype=float), x.shape[1:])
     ends = np.stack([x[0], x[-1]])
     rise = (ends[1] - ends[0]) / ((len(x) - 1) * dt)
-    shifted = _filtered(x, dt, lambda f: np.exp(2j * np.pi * np.multiply.outer(f, tau)))
-    shifted = shifted + rise * tau
-    t = np.add.outer(dt * np.arange(len(x)), tau)
-    shifted = np.where(t < 0, ends[0], shifted)
-    return np.where(t > (len(x) - 1) * dt, ends[1], shifted)
+    alike = tau.ravel()[:1].reshape([1] * tau.ndim) if len(np.unique(tau)) == 1 else tau  # one phase for all columns
+    shifted = _filtered(x, dt, lambda f: np.exp(2j * np.pi * np.multiply.outer(f, alike)))
+    shifted += rise * tau
+    most = min(len(x), int(np.abs(tau).max(initial=0.0) / dt) + 2)  # samples at an end that may be outside
+    first, last = (np.add.outer(dt * np.arange(a, a + most), tau) for a in (0, len(x) - most))
+    shifted[:most] = np.where(first < 0, ends[0], shifted[:most])
+    shifted[-most:] = np.where(last > (len(x) - 1) * dt, ends[1], shifted[-most:])
+    return shifted
 
 
 def lag(signal: ArrayLike, time: ArrayLike, dt: float) -> Array:

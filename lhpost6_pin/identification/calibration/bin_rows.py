@@ -22,11 +22,11 @@ __all__ = ["BandSquares", "BinRows", "bin_rows", "over", "row_by_column", "squar
 class BinRows:
     """Rows of p quantities, in each of c columns those of the quantities that are not zero there.
 
-    Values of a column are real (n,): real parts of its bins, then imaginary parts, times the root of two.
+    Values of a column are real (2 m,): real and imaginary parts of its m bins in turn, times the root of two.
     """
 
     count: int  # p
-    parts: Sequence[tuple[NDArray[np.intp], Array]]  # by column: quantities (a,), and their rows (a, n)
+    parts: Sequence[tuple[NDArray[np.intp], Array]]  # by column: quantities (a,), and their rows (a, 2 m)
 
     def weighed(self, root: Array) -> "BinRows":
         """The same over the roots of a power (m, c)."""
@@ -102,10 +102,9 @@ class BandSquares:
 
 def _products_by_band(rows: Array, starts: NDArray[np.intp]) -> Array:
     """Products (b, a, a) of rows (a, 2 m) with each other in every band of bins."""
-    m, out = rows.shape[1] // 2, np.empty((len(starts), len(rows), len(rows)))
-    for b, (low, high) in enumerate(pairwise((*starts, m))):
-        real, imaginary = rows[:, low:high], rows[:, m + low : m + high]
-        out[b] = real @ real.T + imaginary @ imaginary.T
+    out = np.empty((len(starts), len(rows), len(rows)))
+    for b, (low, high) in enumerate(pairwise((*(2 * starts), rows.shape[1]))):
+        np.matmul(rows[:, low:high], rows[:, low:high].T, out=out[b])
     return out
 
 
@@ -144,32 +143,26 @@ def bin_rows(quantities: Sequence[SparseBins], columns: int) -> BinRows:
             values[column].append(bins[k])
         count += several
     pairs = zip(members, values, strict=True)
-    return BinRows(count, [(np.array(own, np.intp), _part(bins, len(own), width)) for own, bins in pairs])
+    return BinRows(count, [(np.array(own, np.intp), _part(bins, width)) for own, bins in pairs])
 
 
-def _part(bins: Sequence[Complex], count: int, width: int) -> Array:
-    """Real rows (a, 2 m) of `count` quantities' bins, in pieces (p, m)."""
-    out, first = np.empty((count, 2 * width)), 0
-    for piece in bins:
-        last = first + len(piece)
-        out[first:last, :width], out[first:last, width:] = piece.real, piece.imag
-        first = last
-    out *= np.sqrt(2.0)
-    return out
+def _part(bins: Sequence[Complex], width: int) -> Array:
+    """Real rows (a, 2 m) of bins in pieces (p, m)."""
+    both = np.concatenate([np.zeros((0, width), np.complex128), *bins])
+    both *= np.sqrt(2.0)
+    return both.view(np.float64)
 
 
 def row_by_column(bins: Complex, root: Array) -> Array:
     """One row (c, 2 m) of bins (m, c) over the roots of a power (m, c)."""
-    scaled = (bins * (np.sqrt(2.0) / root)).T
-    return np.hstack([scaled.real, scaled.imag])
+    return np.ascontiguousarray((bins * (np.sqrt(2.0) / root)).T).view(np.float64)
 
 
 def squares_of(rows: Array) -> Array:
     """Squares (m, c) of the bins of one row (c, 2 m)."""
-    m = rows.shape[1] // 2
-    return np.asarray(0.5 * (rows[:, :m] ** 2 + rows[:, m:] ** 2).T)
+    return np.asarray(0.5 * (rows[:, ::2] ** 2 + rows[:, 1::2] ** 2).T)
 
 
 def over(root: Array) -> Array:
     """Weights (c, 2 m), of real and of imaginary parts, over the roots of a power (m, c)."""
-    return np.tile(1.0 / root.T, 2)
+    return np.repeat(1.0 / root.T, 2, axis=1)

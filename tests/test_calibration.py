@@ -231,6 +231,19 @@ def test_noise_of_too_few_samples_is_refused():
         make_whitener(noise, [np.array([1.0, 2.5])], np.array([1.0, 2.0, 3.0]))
 
 
+def test_the_last_columns_are_mixed_with_all_others_and_these_not_with_them():
+    rng = np.random.default_rng(4)
+    noise = rng.standard_normal((2000, 4)) @ (np.eye(4) + 0.2 * rng.standard_normal((4, 4))) + 0j
+    f, edges = np.linspace(0.1, 9.9, 2000), np.array([0.0, 5.0, 10.0])
+    last = np.array([True, False, True, False])
+    whitener = make_whitener([[noise]], [f], edges, last=last)
+    assert not whitener.factor[0][:, ~last][:, :, last].any() and whitener.factor[0][:, last][:, :, ~last].any()
+    white = whitener.apply(0, sparse_bins(noise), f).full(4)
+    for band in (f < 5.0, f > 5.0):
+        matrix = white[band].conj().T @ white[band] / band.sum()
+        assert np.allclose(matrix, np.eye(4), atol=0.1)  # 1000 bins: entries scatter by 3 %, their estimate as much
+
+
 def test_columns_that_are_zero_are_whitened_as_all_others():
     rng = np.random.default_rng(3)
     noise = rng.standard_normal((300, 5)) @ rng.standard_normal((5, 5)) + 0j
@@ -388,7 +401,7 @@ def test_pressures_that_stand_in_for_forces_show_in_the_wrench(seen, machine, se
         assert np.abs(alone[:, without.rows("wrench")]).max() > 0.0
 
 
-def test_softer_oil_makes_more_noise_in_flows_alone(problem, seen):
+def test_softer_oil_makes_more_noise_in_flows_than_in_the_wrench(problem, seen):
     soft = -2.0 * problem.prior * (np.array(problem.names) == "hydraulics.bulk_modulus")
     stiff, now = (noise_at(problem, x)[0] for x in (np.zeros(len(soft)), soft))
     share = soft[problem.names.index("hydraulics.bulk_modulus")]
@@ -400,8 +413,9 @@ def test_softer_oil_makes_more_noise_in_flows_alone(problem, seen):
     assert np.all(now[bands][:, flow] > stiff[bands][:, flow])
     assert np.all(now[bands][:, flow] < (factor + 1e-6) * stiff[bands][:, flow])
     assert np.all(now[-1][flow] > (1.0 + 0.6 * (factor - 1.0)) * stiff[-1][flow])
-    # of the wrench it is the same, but for friction's states at the start, which noise common to flows and forces shows
-    assert np.allclose(now[bands][:, wrench], stiff[bands][:, wrench], rtol=1e-3)
+    # the wrench is whitened last: noise that it shares with flows is taken out by what stiff oil makes of these
+    rise = now[bands] / stiff[bands] - 1.0
+    assert np.all(np.abs(rise[:, wrench]) < 0.5 * rise[-1][flow].max())
 
 
 def test_whitened_bins_scale_with_the_whitener(problem):

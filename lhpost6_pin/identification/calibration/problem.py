@@ -118,8 +118,8 @@ class Problem:
             found[:] = [bins * np.sqrt((draws + len(more)) / draws) for bins in found]
         # where all friction acts along one axis or two, what its form leaves there is no noise of other kinds
         kinds_of = None if machine.motion == "free" else np.repeat(np.arange(len(self.widths)), self.widths)
-        order = np.argsort(self.rows("wrench"), kind="stable")  # its columns, in which most unknowns show, last
-        self.whitener = make_whitener(noise, self.frequency, np.array(comparison.bands), kinds_of, order)
+        bands, last = np.array(comparison.bands), self.rows("wrench")  # in which most unknowns show
+        self.whitener = make_whitener(noise, self.frequency, bands, kinds_of, last)
         self.starts = [self._starts(plant, t) for t in range(len(tests))]
 
     def _set(self, machine: Machine, parameters: tuple[FreeParameter, ...]) -> "Problem":

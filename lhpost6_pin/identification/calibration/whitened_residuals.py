@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.arrays import Array, Complex
+from ...core.arrays import Array, Complex, Mask
 from ...core.errors import RecordError
 from .sparse_bins import SparseBins
 
@@ -114,17 +114,20 @@ def make_whitener(
     frequency: Sequence[Array],
     edges: Array,
     groups: NDArray[np.int64] | None = None,
-    order: NDArray[np.intp] | None = None,
+    last: Mask | None = None,
 ) -> Whitener:
     """Whitener from realisations of every test's noise, bins (m, k) at its frequencies (m,).
 
     Columns are scaled by their noise in that test: friction at rest wanders where a leg hardly slides. Correlations are
     pooled over all tests, and those of means with the first band: one test has too few bins in a band. Columns of
-    different `groups` (k,) count as uncorrelated.
+    different `groups` (k,) count as uncorrelated. Each column is mixed with those before it, and the `last` (k,) with
+    all others: if these are the ones in which most quantities show, whitened quantities show in few columns.
 
     Raises RecordError if all together still have too few.
     """
     count, k = len(edges) - 1, noise[0][0].shape[1]
+    places = np.arange(k) if last is None else np.argsort(last, kind="stable")
+    order = np.ix_(places, places)
     factors = np.zeros((len(noise), count, k, k), np.complex128)
     scaled: list[list[Complex]] = [[] for _ in range(count)]
     for t, (realisations, f) in enumerate(zip(noise, frequency, strict=True)):
@@ -146,12 +149,9 @@ def make_whitener(
         matrix = rows.T @ rows.conj() / len(rows)  # E[x x^H]
         if groups is not None:
             matrix = np.where(groups[:, None] == groups, matrix, 0.0)
-        if order is None:
-            factors[:, b] = _uncorrelated(matrix, len(rows)) @ factors[:, b]
-        else:
-            mixed = np.zeros_like(matrix)
-            mixed[np.ix_(order, order)] = _uncorrelated(matrix[np.ix_(order, order)], len(rows))
-            factors[:, b] = mixed @ factors[:, b]
+        mixed = np.zeros_like(matrix)
+        mixed[order] = _uncorrelated(matrix[order], len(rows))
+        factors[:, b] = mixed @ factors[:, b]
     return Whitener(edges, factors)
 
 

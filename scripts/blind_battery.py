@@ -164,7 +164,7 @@ def main() -> None:
         words = [option for option in ("anew", "fewer") if getattr(asked, option)]
         page = RESULTS / f"{'_'.join(['results', *words])}.md"
         _draw(list(answered.values()), page.with_suffix(".svg"))
-        publish(text, page, "Scores of the blind battery", command, FIGURE)
+        publish(text, folder, page, "Scores of the blind battery", command, FIGURE)
     if asked.check and (why := wrong(labels, answered, "family first", LEAST)):
         sys.exit(why)
 

@@ -117,7 +117,7 @@ def main() -> None:
         length = " --brief" if asked.campaign == "brief" else ""
         only = f" --only {asked.only}" if asked.only else ""
         command = f"python scripts/one_axis_battery.py --cases {asked.cases} --seed {asked.seed}{length}{only}"
-        publish(text, RESULTS, "Scores of the one-axis battery", command)
+        publish(text, folder, RESULTS, "Scores of the one-axis battery", command)
     if asked.check and (why := wrong(labels, answered, "family first", LEAST)):
         sys.exit(why)
 

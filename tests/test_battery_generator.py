@@ -409,7 +409,7 @@ def test_stated_probabilities_are_held_against_what_was_right():
     assert scoring.reliability([(label, right), (label, wrong)]) == {"0.5 to 0.7": (0, 1), "0.9 to 0.99": (1, 1)}
 
 
-def test_the_figure_of_a_battery_comes_first_and_is_the_same_however_often_it_is_drawn(tmp_path):
+def test_the_page_of_a_battery_begins_with_its_figure_and_commits_and_is_the_same_however_often_it_is_drawn(tmp_path):
     pytest.importorskip("matplotlib")
     from battery.curves import draw_curves
 
@@ -421,8 +421,13 @@ def test_the_figure_of_a_battery_comes_first_and_is_the_same_however_often_it_is
     assert (tmp_path / "scores.svg").read_bytes() == drawn
     draw_curves(strength, {"0.5 to 0.7": scoring.Share(4, 5)}, tmp_path / "others.svg")
     assert (tmp_path / "others.svg").read_bytes() != drawn
-    reporting.publish("| metric |", tmp_path / "scores.md", "Scores", "command", "What it shows")
-    assert (tmp_path / "scores.md").read_text().splitlines()[2] == "![What it shows](scores.svg)"
+    for case, commit in (("a", "1fd1686"), ("b", "abd0a4f-dirty"), ("c", "1fd1686")):
+        (tmp_path / case).mkdir()
+        (tmp_path / case / "commit.txt").write_text(commit)
+    reporting.publish("| metric |", tmp_path, tmp_path / "scores.md", "Scores", "command", "What it shows")
+    _, _, picture, _, how, *_ = (tmp_path / "scores.md").read_text().splitlines()
+    assert picture == "![What it shows](scores.svg)"
+    assert "(commit 1fd1686, abd0a4f-dirty)" in how  # those that its cases were searched at
 
 
 def test_a_miss_is_listed_with_the_reason_of_the_last_round():

@@ -1,11 +1,13 @@
 """Searching the cases of a battery, and its scores as Markdown."""
 
 import json
+import subprocess
 import time
 import tomllib
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 
 from joblib import parallel_config
@@ -53,7 +55,18 @@ def search(home: Path, machine: Machine, sensors: SensorSet, phases: Sequence[in
         return
     (home / "error.txt").unlink(missing_ok=True)
     (home / "seconds.txt").write_text(f"{time.perf_counter() - begin:.1f}", encoding="utf-8")
+    (home / "commit.txt").write_text(_commit(), encoding="utf-8")
     save_verdict(found, home / "verdict.json")
+
+
+@cache
+def _commit() -> str:
+    """Commit of the code at hand, `-dirty` with changes beyond it; unknown without git."""
+    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--exclude=*"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
 
 
 def answers(folder: Path, labels: Mapping[str, Label]) -> dict[str, tuple[Label, Answer]]:
@@ -117,13 +130,16 @@ def wrong(labels: Mapping[str, Label], answered: Mapping[str, tuple[Label, Answe
     return f"too few right names: {first.text}" if first.hits < least * first.of else ""
 
 
-def publish(text: str, path: Path, title: str, command: str, figure: str = "") -> None:
+def publish(text: str, folder: Path, path: Path, title: str, command: str, figure: str = "") -> None:
     """Write scores to a page of the documentation's, with the command that gave them, the version and the day.
 
-    figure says what the picture beside the page shows, which comes first; empty without one.
+    Its cases are in `folder`, each with the commit it was searched at. figure says what the picture beside the page
+    shows, which comes first; empty without one.
     """
     today = datetime.now(UTC).date().isoformat()
-    how = f"`{command} --publish`, version {__version__}, {today}. Shares with 95 % Wilson intervals."
+    commits = sorted({one.read_text(encoding="utf-8") for one in folder.glob("*/commit.txt")})
+    code = f"version {__version__} (commit {', '.join(commits) or 'unknown'})"
+    how = f"`{command} --publish`, {code}, {today}. Shares with 95 % Wilson intervals."
     with write_whole(path) as beside:
         picture = f"![{figure}]({path.stem}.svg)\n\n" if figure else ""
         beside.write_text(f"# {title}\n\n{picture}{how}\n\n{text}", encoding="utf-8")

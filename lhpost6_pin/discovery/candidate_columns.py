@@ -84,7 +84,7 @@ def _by_difference(problem: Problem, base: OperatingPoint, candidate: Candidate)
     parts = []
     for size, one in _one_by_one(candidate):
         changes = problem.change(base, make_plant(candidate.on(base.plant.machine, one)), candidate.family.shows_in)
-        parts.append([c._replace(bins=c.bins / size) for c in changes])
+        parts.append([change.per(size) for change in changes])
     return [list(pieces) for pieces in zip(*parts, strict=True)]
 
 
@@ -125,5 +125,4 @@ def _by_actuator(problem: Problem, base: OperatingPoint, candidate: Candidate) -
     changes = problem.change(base, make_plant(candidate.on(base.plant.machine, (size,))), candidate.family.shows_in)
     places = [base.plant.machine.actuator_names.index(name) for name in candidate.components]
     rows = [problem.rows_of_actuator(place) for place in places]
-    scaled = [c._replace(bins=c.bins / size) for c in changes]
-    return [[one.some(own) for own in rows] for one in scaled]
+    return [[change.per(size).some(own) for own in rows] for change in changes]

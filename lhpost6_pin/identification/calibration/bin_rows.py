@@ -136,12 +136,11 @@ def bin_rows(quantities: Sequence[SparseBins], columns: int) -> BinRows:
     values: list[list[Complex]] = [[] for _ in range(columns)]
     count, width = 0, quantities[0].bins.shape[-1] if quantities else 0
     for one in quantities:
-        bins = one.bins.reshape(len(one.columns), -1, width) if len(one.columns) else one.bins[:0]
-        several = one.bins.shape[1] if one.bins.ndim > 2 else 1
-        for k, column in enumerate(one.columns.tolist()):
-            members[column] += range(count, count + several)
-            values[column].append(bins[k])
-        count += several
+        last = count + one.each.shape[1]
+        for column, bins in zip(one.columns.tolist(), one.each, strict=True):
+            members[column] += range(count, last)
+            values[column].append(bins)
+        count = last
     pairs = zip(members, values, strict=True)
     return BinRows(count, [(np.array(own, np.intp), _part(bins, width)) for own, bins in pairs])
 

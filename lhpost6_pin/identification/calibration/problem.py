@@ -275,8 +275,7 @@ class Problem:
                 if place >= 0:
                     rows = self.rows("gas", place) if group.residuals == ("gas",) else self.rows_of_actuator(place)
                     own = [change.some(rows) for change in changes]
-                slopes = (one._replace(bins=one.bins / step[i]) for one in own)
-                out.append((i, [self.whitened(t, slope) for t, slope in enumerate(slopes)]))
+                out.append((i, [self.whitened(t, change.per(step[i])) for t, change in enumerate(own)]))
         return out
 
     def change(

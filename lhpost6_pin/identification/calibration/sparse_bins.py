@@ -19,6 +19,16 @@ class SparseBins(NamedTuple):
     columns: NDArray[np.intp]  # (k,) rising
     bins: Complex  # (k, m), or (k, p, m) of p quantities
 
+    @property
+    def each(self) -> Complex:
+        """Bins (k, p, m) of every quantity."""
+        m = self.bins.shape[-1]
+        return self.bins.reshape(len(self.columns), self.bins.shape[1] if self.bins.ndim > 2 else 1, m)
+
+    def per(self, size: float) -> "SparseBins":
+        """Bins per unit of what changed by a size."""
+        return self._replace(bins=self.bins / size)
+
     def times(self, scale: Array) -> "SparseBins":
         """Bins (k, m) scaled (m, c)."""
         return self._replace(bins=self.bins * scale.T[self.columns])

@@ -35,15 +35,15 @@ class StartStates(NamedTuple):
         """Whitened bins less what states at the start explain of them."""
         if not (len(self.removed) and np.isin(self.columns, some.columns).any()):
             return some
-        columns, bins = np.union1d(self.columns, some.columns), some.bins
-        out = np.zeros((len(columns), *bins.shape[1:]), np.complex128)
-        out[np.searchsorted(columns, some.columns)] = bins
+        columns = np.union1d(self.columns, some.columns)
+        out = np.zeros((len(columns), *some.each.shape[1:]), np.complex128)
+        out[np.searchsorted(columns, some.columns)] = some.each
         places = np.searchsorted(columns, self.columns)
-        own = out[places].reshape(len(places), -1, bins.shape[-1]).swapaxes(0, 1)
+        own = out[places].swapaxes(0, 1)
         flat = _parts(own)
         flat -= ((flat @ self.duals.T) * self.removed) @ self.directions
-        out[places] = flat.view(np.complex128).reshape(own.shape).swapaxes(0, 1).reshape(out[places].shape)
-        return SparseBins(columns, out)
+        out[places] = flat.view(np.complex128).reshape(own.shape).swapaxes(0, 1)
+        return SparseBins(columns, out.reshape(len(columns), *some.bins.shape[1:]))
 
     def scaled(self, scale: Array) -> "StartStates":
         """The same for whitened bins that are larger by a scale (m, c)."""

@@ -67,14 +67,12 @@ class Whitener(NamedTuple):
 
     def apply(self, test: int, some: SparseBins, f: Array) -> SparseBins:
         """Whitened bins of a test's at f (m,), in the columns that show them: noise has unit power, uncorrelated."""
-        every, m = self.factor[test][:, :, some.columns], len(f)
-        columns = np.flatnonzero((every != 0.0).any(axis=(0, 2)))
-        bins = some.bins.reshape(len(some.columns), some.bins.size // max(len(some.columns) * m, 1), m)
-        out, first = np.empty((len(columns), *bins.shape[1:]), np.complex128), self.starts(f)
+        factor, (k, count, m) = self.factor[test][:, :, some.columns], some.each.shape
+        columns = np.flatnonzero(factor.any(axis=(0, 2)))
+        out, first = np.empty((len(columns), count, m), np.complex128), self.starts(f)
         for b, low, high in zip(self.band(f)[first], first, (*first[1:], m), strict=True):
-            part = bins[:, :, low:high]
-            mixed = every[b][columns] @ part.reshape(len(part), part[0].size if len(part) else 0)
-            out[:, :, low:high] = mixed.reshape(len(columns), *part.shape[1:])
+            mixed = factor[b][columns] @ some.each[:, :, low:high].reshape(k, count * (high - low))
+            out[:, :, low:high] = mixed.reshape(len(columns), count, high - low)
         return SparseBins(columns, out.reshape(len(columns), *some.bins.shape[1:]))
 
 

@@ -39,7 +39,7 @@ from lhpost6_pin.discovery.estimates import (
 )
 from lhpost6_pin.discovery.floor import expected_gaps, model_at
 from lhpost6_pin.discovery.held_out import prove
-from lhpost6_pin.discovery.joint_fit import _best_strength, fit_from_rival, fit_jointly, refined, with_candidate
+from lhpost6_pin.discovery.joint_fit import _best_start, fit_from_rival, fit_jointly, refined, with_candidate
 from lhpost6_pin.discovery.localise import gap_map, worst_spots
 from lhpost6_pin.discovery.next_test import _trial
 from lhpost6_pin.discovery.residual_function import (
@@ -819,6 +819,18 @@ def test_a_fit_that_ends_higher_than_it_began_is_not_kept(found, monkeypatch):
     np.testing.assert_array_equal(kept.solution.at, search.solution.x)
 
 
+def test_a_search_from_known_numbers_that_ends_higher_keeps_them(found, monkeypatch):
+    """Equations corrected for noise may have no root there: their steps then lead away."""
+    search = found.search
+    away = 0.3 * search.problem.prior * (np.array(search.problem.names) == "horizontal.flow")
+    monkeypatch.setattr(fit, "bounded_step", lambda *given: away)
+    kept = search.solved(search.problem, search.solution.x, lambda share: None)
+    np.testing.assert_array_equal(kept.solution.x, search.solution.x)
+    assert kept.objective == pytest.approx(search.objective, rel=1e-9)  # the same numbers
+    went = solve(search.problem, search.calibration, search.solution.x, lambda share: None, frugal=True)
+    assert went.x[away > 0.0] != search.solution.x[away > 0.0]  # one that knows nothing begins where nothing is fitted
+
+
 def test_an_effect_is_not_credited_with_what_others_gain(found, monkeypatch):
     """An overlap of a millionth does nothing: without it all is explained as well, wherever a refit ends."""
     search, one = found.search, candidate("valve_deadband", "H1")
@@ -921,13 +933,37 @@ def test_no_strength_that_leaves_the_platen_no_inertia_is_fitted(found):
     high = one.bounds[1]
     with pytest.raises(ParameterError, match="no inertia"):  # a linear estimate may well be that far off
         make_plant(with_candidate(problem, one, tuple(high), (), x)[0].machine)
-    assert not _best_strength(found.search, one, high, (1.0,), afresh=False).any()
-    small = _best_strength(found.search, one, high, (1.0, 1e-6), afresh=False)
-    np.testing.assert_array_equal(small, 1e-6 * high)
+    assert not any(started(found.search, one, high)[0])
+    np.testing.assert_array_equal(started(found.search, one, high, (1.0, 1e-6))[0], 1e-6 * high)
     mass = candidate("added_mass", "platen")  # products jump at zero, which is no start
     far = np.array([-1.0, 1e6, 1e6, 1e6])
     typical = [shape.typical for shape in mass.amplitudes]
-    np.testing.assert_array_equal(_best_strength(found.search, mass, far, (1.0,), afresh=False), typical)
+    np.testing.assert_array_equal(started(found.search, mass, far)[0], typical)
+
+
+def started(search, one, amplitude, strengths=(1.0,), change=0.0, afresh=False):
+    """Where a joint fit of a candidate begins, by its linear estimate with a change of all else."""
+    none, moved = np.zeros(len(amplitude)), np.zeros(len(search.problem.names)) + change
+    return _best_start(search, one, Score(1.0, np.asarray(amplitude), none, none, moved), strengths, afresh=afresh)
+
+
+def test_a_joint_fit_begins_with_what_else_the_linear_estimate_moves_if_that_explains_more(found):
+    """More leakage by an effect, and as much less by the parameter of the model: the same residual."""
+    search, at = found.search, found.search.solution.at
+    one = candidate("piston_leakage", "H1", "H2", "H3", "H4")
+    leakage = [name == "horizontal.leakage" for name in search.problem.names]
+    (place,) = np.flatnonzero(leakage)
+    parameter, prior = search.problem.parameters[place], search.problem.prior[place]
+    less = parameter.at(float(at[place])) - parameter.at(float(at[place] - prior))
+    assert less > 0.0
+    amplitude, moved = started(search, one, [less], change=-1.0 * np.array(leakage))
+    assert amplitude == (less,)
+    np.testing.assert_allclose(moved - at, -prior * np.array(leakage))
+    for options in ({"change": np.array(leakage)}, {"afresh": True}):
+        _, x = started(search, one, [less], **options)
+        np.testing.assert_array_equal(x, 0.0 * at if options.get("afresh") else at)
+    other = Score(1.0, np.array([less]), np.zeros(1), np.zeros(1), np.ones(len(at) - 1))  # beside one effect less
+    np.testing.assert_array_equal(_best_start(search, one, other, (1.0,), afresh=False)[1], at)
 
 
 def test_a_candidate_without_derivatives_is_not_fitted(found, monkeypatch):

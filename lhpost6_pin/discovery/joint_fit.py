@@ -11,8 +11,10 @@ from ..core.errors import ParameterError
 from ..core.progress import Progress, split
 from ..identification.calibration.fit import objective_at
 from ..identification.calibration.free_parameters import FreeParameter
+from ..identification.calibration.normal_equations import bounds_of
 from ..identification.calibration.problem import Problem
 from .candidates import Candidate
+from .scores import Score
 from .search_state import Scored, Search
 
 __all__ = ["JointFit", "fit_from_rival", "fit_jointly", "refined", "with_candidate"]
@@ -106,7 +108,7 @@ def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool, r
     else:
         far = found.power >= found.numbers.number("accept.settled")
         strengths = found.numbers.vector("accept.strengths") if far else (1.0,)
-        amplitudes = tuple(_best_strength(found, candidate, one.score.amplitude, strengths, afresh=afresh).tolist())
+        amplitudes, start = _best_start(found, candidate, one.score, strengths, afresh=afresh)
         own = candidate.fit_parameters(amplitudes, found.numbers)
         problem, start = with_candidate(problem, candidate, amplitudes, own, start)
     # derivatives that change much with an effect: for one of the oil, those by numbers of oil and valves
@@ -118,22 +120,29 @@ def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool, r
         return found
 
 
-def _best_strength(
-    found: Search, candidate: Candidate, amplitude: Array, strengths: Sequence[float], *, afresh: bool
-) -> Array:
-    """The linear estimate (q,) of a candidate's amplitudes, times the factor of some with which it explains most.
+def _best_start(
+    found: Search, candidate: Candidate, one: Score, strengths: Sequence[float], *, afresh: bool
+) -> tuple[tuple[float, ...], Array]:
+    """Amplitudes (q,) of a candidate, and all other unknowns (p,), with which it explains most.
 
-    Far from the optimum the linear estimate may be several times too small or too large. Where none of them makes a
-    machine, zero; typical sizes where residuals are not linear in the amplitudes.
+    Of the linear estimate times the factor of some, and of that with all else moved as it estimates: without that a
+    residual may first grow in bands that then count as noise. Far from the optimum the estimate may be several times
+    too small or too large. Where none of them makes a machine, zero; typical sizes where residuals are not linear in
+    the amplitudes.
     """
-    start, least = found.solution.at, np.inf
-    best = np.zeros_like(amplitude) if candidate.family.linear else np.array([s.typical for s in candidate.amplitudes])
-    for factor in strengths:
-        tried = np.clip(factor * amplitude, *candidate.bounds)
-        problem, x = with_candidate(found.problem, candidate, tuple(tried.tolist()), (), start)
-        value = objective_at(problem, np.zeros_like(x) if afresh else x)
+    at, least = found.solution.at, np.inf
+    zero = [0.0 if candidate.family.linear else s.typical for s in candidate.amplitudes]
+    starts = [(factor, np.zeros_like(at) if afresh else at) for factor in strengths]
+    if not afresh and len(one.change) == len(at):  # not of a candidate that was scored beside other effects
+        low, high = bounds_of(found.problem, found.calibration)
+        moved = at + one.change * found.problem.prior
+        starts.append((1.0, np.clip(moved, np.minimum(low, at), np.maximum(high, at))))
+    best = tuple(zero), starts[0][1]
+    for factor, x in starts:
+        tried = tuple(np.clip(factor * one.amplitude, *candidate.bounds).tolist())
+        value = objective_at(*with_candidate(found.problem, candidate, tried, (), x))
         if value < least:
-            best, least = tried, value
+            best, least = (tried, x), value
     return best
 
 

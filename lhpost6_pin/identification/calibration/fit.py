@@ -142,6 +142,9 @@ def solve(
     two of them do not change the objective.
 
     The correction for noise in the derivatives is evaluated in the second step, in a `frugal` search in the first.
+    A search that ends higher than it began, from numbers that are `known` to be near, keeps these: noise in derivatives
+    may leave equations, once corrected, no root there.
+
     Derivatives by unknowns of `known`, which is corrected, are reused; `first` are the normal equations at `start`, if
     already evaluated. A frugal search evaluates derivatives by nearly linear unknowns only at `start`, all others while
     steps gain much and nothing is `known`; a `settled` one only those that `known` lacks, and those `near` (p,) them.
@@ -183,6 +186,8 @@ def solve(
         if bias is not None and (done > 1 or known is not None):
             normal = normal.less(bias)
         value = objective(problem, normal.residual, x)
+        if held is None:
+            begin, begun = value, normal
         quiet = quiet + 1 if abs(value - last) < flat else 0
         damped *= 0.5 if value > last else 1.0  # else steps may go to and fro where the objective is flat
         least, last, held, at = min(least, value), value, normal, x
@@ -203,6 +208,8 @@ def solve(
     rest = held.residual if base is None else problem.residual(base)
     if base is None or objective(problem, rest, x) > least + OVERSHOT:
         x, rest = at, held.residual
+    if known is not None and objective(problem, rest, x) > begin:
+        x, at, held, rest = start, start, begun if bias is None else begun.less(bias), begun.residual
     return Solution(x, at, held.released(), rest, before, done, converged)
 
 

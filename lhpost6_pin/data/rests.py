@@ -44,7 +44,8 @@ def restless(records: Sequence[xr.Dataset], numbers: Parameters | None = None) -
     """The channel that moves on where all others rest longest, as `platen_displacement[z]`; empty if none does."""
     found, limits, slow = _judged(records, numbers or rest_numbers())
     blocks = {key: sum(int(_still(b, limits, but=key).sum()) for b in found) for key in limits}
-    moving = slow or {key for key, count in blocks.items() if count == max(blocks.values()) > 0}
+    whole = sum(int(_still(b, limits).sum()) for b in found)
+    moving = [key for key in blocks if key in slow] or [key for key, count in blocks.items() if count > whole]
     if not moving:
         return ""
     name, column = max(moving, key=lambda key: blocks[key])

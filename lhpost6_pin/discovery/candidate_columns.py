@@ -125,4 +125,4 @@ def _by_actuator(problem: Problem, base: OperatingPoint, candidate: Candidate) -
     changes = problem.change(base, make_plant(candidate.on(base.plant.machine, (size,))), candidate.family.shows_in)
     places = [base.plant.machine.actuator_names.index(name) for name in candidate.components]
     rows = [problem.rows_of_actuator(place) for place in places]
-    return [[change.per(size).some(own) for own in rows] for change in changes]
+    return [[change.some(own).per(size) for own in rows] for change in changes]

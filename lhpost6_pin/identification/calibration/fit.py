@@ -206,9 +206,10 @@ def solve(
     assert held is not None
     base = _possible(problem, x)
     rest = held.residual if base is None else problem.residual(base)
-    if base is None or objective(problem, rest, x) > least + OVERSHOT:
-        x, rest = at, held.residual
-    if known is not None and objective(problem, rest, x) > begin:
+    end = np.inf if base is None else objective(problem, rest, x)
+    if end > least + OVERSHOT:
+        x, rest, end = at, held.residual, last
+    if known is not None and end > begin:
         x, at, held, rest = start, start, begun if bias is None else begun.less(bias), begun.residual
     return Solution(x, at, held.released(), rest, before, done, converged)
 

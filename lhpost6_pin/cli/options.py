@@ -57,7 +57,7 @@ _settings = completing(lambda: shipped("controllers"))
 
 CampaignFolder = Annotated[Path, typer.Argument(help="Campaign: a directory of records of one machine in one state.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON and nothing else.")]
-Jobs = Annotated[int, _jobs("threads", "Threads; -1: all cores.")]
+Jobs = Annotated[int, _jobs("cores", "Cores; -1: all.")]
 Processes = Annotated[int, _jobs("processes", "Processes; -1: one a core.")]
 Beyond = Annotated[bool, typer.Option("--beyond-limits", help="Run a motion beyond the limits of the table.")]
 Valves = Annotated[

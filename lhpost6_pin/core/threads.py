@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from typing import TypeVar
 
-__all__ = ["by_threads", "fill_by_threads", "row_blocks"]
+__all__ = ["by_threads", "fill_by_threads", "processors", "row_blocks", "work_alone"]
 
 _MOST = 4
 """Threads beyond which what the interpreter does between compiled parts takes longer than these."""
@@ -17,6 +17,9 @@ _ROWS = 8192
 _P = TypeVar("_P")
 _R = TypeVar("_R")
 
+_limit: list[int] = []
+"""Largest number of threads, if it was set."""
+
 
 def by_threads(function: Callable[[_P], _R], parts: Sequence[_P], jobs: int = -1) -> Iterator[_R]:
     """What a function gives for each part, in their order; the first error that it raises ends the work.
@@ -24,7 +27,7 @@ def by_threads(function: Callable[[_P], _R], parts: Sequence[_P], jobs: int = -1
     It runs in the caller's context: numpy's handling of floating-point errors is as there. `jobs` is the largest number
     of threads, -1 that of this process.
     """
-    if (count := min(_threads() if jobs < 1 else jobs, len(parts))) < 2:
+    if (count := min(*_limit, min(_MOST, processors()) if jobs < 1 else jobs, len(parts))) < 2:
         yield from map(function, parts)
         return
     each = [(copy_context(), part) for part in parts]
@@ -32,10 +35,15 @@ def by_threads(function: Callable[[_P], _R], parts: Sequence[_P], jobs: int = -1
         yield from pool.map(lambda one: one[0].run(function, one[1]), each)
 
 
-def _threads() -> int:
-    """Threads of this process: one a processor, or as OMP_NUM_THREADS states, which joblib and Dask set for workers."""
-    stated = os.environ.get("OMP_NUM_THREADS", "")
-    return min(_MOST, len(os.sched_getaffinity(0)), int(stated) if stated.isdecimal() else _MOST)
+def processors() -> int:
+    """Processors of this process, or as many as OMP_NUM_THREADS states, which joblib and Dask set for workers."""
+    stated, count = os.environ.get("OMP_NUM_THREADS", ""), len(os.sched_getaffinity(0))
+    return min(count, int(stated)) if stated.isdecimal() else count
+
+
+def work_alone() -> None:
+    """Use no threads from now on: this process is one of as many as there are processors."""
+    _limit.append(1)
 
 
 def row_blocks(rows: int) -> list[slice]:

@@ -91,9 +91,9 @@ def discover(
 
     hold_out are tests for validation, not searched; None: with more than three tests, the least informative one. phases
     are those of that validation. Deterministic for a seed (of the simulated noise), independent of the number of `jobs`
-    (threads; -1: one a core). `propose` simulates tests that would discriminate between rivals where the verdict is
-    ambiguous. The folder `unfinished` holds a checkpoint until the search ends; an interrupted search with the same
-    inputs resumes from it and reaches the same verdict.
+    (cores; -1: all). `propose` simulates tests that would discriminate between rivals where the verdict is ambiguous.
+    The folder `unfinished` holds a checkpoint until the search ends; an interrupted search with the same inputs resumes
+    from it and reaches the same verdict.
 
     Tests that cannot be compared are skipped (`usable_tests`). Raises UnknownNameError for a test that is not in the
     campaign; RecordError where no test is left to search; and what `calibrate` raises.

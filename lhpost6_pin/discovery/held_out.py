@@ -18,11 +18,12 @@ import numpy as np
 import xarray as xr
 
 from ..core.arrays import Array
+from ..core.processes import by_processes
 from ..core.progress import Progress
 from ..data.campaign import Campaign
 from ..data.sensors import SensorSet
 from ..identification.calibration.prepare import as_simulated
-from ..identification.validation import PHASES, Phase, validate
+from ..identification.validation import PHASES, Phase, Validation, validate
 from ..identification.validation.prepare_tests import Numbers
 from ..machine.machine import Machine
 from .floor import COMPARED, NOISE, expected_gaps, model_at, normalised_error
@@ -91,9 +92,13 @@ def prove(
     less = [without_effect(found, one.candidate).solution for one in found.added] if len(names) > 1 else []
     for problem, x in ((s.normal.problem, s.x) for s in (found.refit, found.solution, *less)):
         models.append(model_at(problem, x, records))
+
+    def validated(one: tuple[Machine, Sequence[xr.Dataset]]) -> Validation:
+        return validate(one[0], Campaign("held out", tuple(one[1])), sensors=sensors, phases=phases, jobs=jobs)
+
     done = []
-    for i, (model, some) in enumerate(models):
-        done.append(validate(model, Campaign("held out", tuple(some)), sensors=sensors, phases=phases, jobs=jobs))
+    for i, one in enumerate(by_processes(validated, models, jobs)):
+        done.append(one)
         progress((i + 1) / (len(models) + 1))
     without, done = done[3:] or done[1:2], done[:3]
     floors = expected_gaps(found, records, done[-1], sensors, phases, jobs)

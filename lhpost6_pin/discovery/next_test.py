@@ -11,10 +11,10 @@ from functools import partial
 
 import numpy as np
 import xarray as xr
-from joblib import Parallel, delayed
 
 from ..control import ControllerSettings
 from ..core.errors import SimulationError
+from ..core.processes import by_processes
 from ..data.sensors import SensorSet
 from ..identification.calibration.free_parameters import FreeParameter
 from ..identification.calibration.normal_equations import NormalEquations
@@ -49,7 +49,7 @@ def next_tests(found: Search, settings: ControllerSettings, sensors: SensorSet) 
             one, other = (_simulated(found, each) for each in (added.contest[0], rival))
             given = settings, sensors, found.calibration, found.numbers, measured
             trial = partial(_trial, one, other, *given)
-            trials = Parallel(n_jobs=found.problem.jobs, prefer="threads")(delayed(trial)(test) for test in tests)
+            trials = list(by_processes(trial, tests, found.problem.jobs))
             ranked += sorted(trials, key=lambda one: -np.nan_to_num(one.margin))
     return tuple(ranked)
 

@@ -10,10 +10,10 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from ..core.arrays import Array
+from ..core.processes import by_processes
 from ..core.progress import Progress
 from ..identification.calibration.operating_point import OperatingPoint
 from ..identification.calibration.problem import Problem
@@ -84,11 +84,10 @@ def screen(found: Search, linear: Linearisation, progress: Progress) -> Round:
         along = one.amplitude * (np.arange(len(problem.names)) == place)
         explained = [slope.times(along) for slope in background.slope] if one.gain >= look else []
         scored.append(judged(candidate, one, explained))
-    with Parallel(n_jobs=problem.jobs, prefer="threads", return_as="generator") as parallel:
-        batches = [groups[i : i + BATCH] for i in range(0, len(groups), BATCH)]
-        for done, some in enumerate(parallel(delayed(of_batch)(batch) for batch in batches)):
-            scored += some
-            progress((done + 1) / len(batches))
+    batches = [groups[i : i + BATCH] for i in range(0, len(groups), BATCH)]
+    for done, some in enumerate(by_processes(of_batch, batches, problem.jobs)):
+        scored += some
+        progress((done + 1) / len(batches))
     return Round(tuple(_by_rank(_without_parts(scored), numbers.number("accept.simpler"))))
 
 

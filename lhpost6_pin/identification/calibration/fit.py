@@ -62,7 +62,7 @@ def calibrate(
 
     Records are of one machine in one state, with the same channels; each may have its own sample rate. Servovalves are
     open as in the first. `skipped` are tests that are not among them (`usable_tests`), for the result. Deterministic
-    for a seed (of the simulated noise), independent of the number of `jobs` (threads; -1: one a core). `progress` is
+    for a seed (of the simulated noise), independent of the number of `jobs` (cores; -1: all). `progress` is
     called with the share done.
 
     Raises RecordError for a record that breaks the layout, is of another machine, or was made with a specimen that the

@@ -24,7 +24,7 @@ class Unknowns(Protocol):
     unknowns: tuple[SensorUnknown, ...]
     tests: tuple[MeasuredTest, ...]
     kinds: tuple[str, ...]
-    jobs: int  # threads
+    jobs: int  # cores
 
     def plant_at(self, x: Array) -> Plant:
         """Plant with its parameters set to x (p,)."""

@@ -6,13 +6,14 @@ Unknowns x (p,): the machine's parameters, then the sensors' errors; zero at nom
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from ...core.arrays import Array, Complex, Mask
+from ...core.processes import by_processes
 from ...core.threads import by_threads
 from ...data.sensors import SensorSet
 from ...machine.machine import Machine
@@ -248,16 +249,16 @@ class Problem:
         """Derivatives of the whitened bins of every test by the unknowns in `free` (p,), by differences."""
         groups = [g for g in self.groups if any(free[i] for i, _ in g.members)]
         out: list[Slopes] = [{} for _ in self.tests]
-        with Parallel(n_jobs=self.jobs, prefer="threads", return_as="generator_unordered") as parallel:
-            for done, found in enumerate(parallel(delayed(self._difference)(base, g, free) for g in groups)):
-                for i, changes in found:
-                    for slopes, change in zip(out, changes, strict=True):
-                        slopes[i] = change
-                progress((done + 1) / len(groups))
+        differences = by_processes(partial(self._difference, base, free), groups, self.jobs)
+        for done, found in enumerate(differences):
+            for i, changes in found:
+                for slopes, change in zip(out, changes, strict=True):
+                    slopes[i] = change
+            progress((done + 1) / len(groups))
         return out
 
     def _difference(
-        self, base: OperatingPoint, group: EvaluationGroup, free: Mask
+        self, base: OperatingPoint, free: Mask, group: EvaluationGroup
     ) -> list[tuple[int, list[SparseBins]]]:
         """Derivatives of every test's whitened bins, by place in x."""
         x, count = base.x, len(self.parameters)

@@ -15,8 +15,9 @@ from lhpost6_pin.data.records import load_record, save_record
 from lhpost6_pin.data.sensors import load_sensors
 from lhpost6_pin.effects.registry import law_of, states_of
 from lhpost6_pin.identification.calibration import calibration_numbers
+from lhpost6_pin.identification.calibration.normal_equations import NoiseBias, NormalEquations
 from lhpost6_pin.identification.calibration.operating_point import OperatingPoint
-from lhpost6_pin.identification.calibration.prepare import prepare_problem
+from lhpost6_pin.identification.calibration.prepare import policy_of, prepare_problem
 from lhpost6_pin.identification.calibration.sparse_bins import sparse_bins
 from lhpost6_pin.identification.calibration.start_states import no_start_states, start_states
 from lhpost6_pin.identification.decompose.agreement import find_agreement
@@ -75,6 +76,53 @@ def test_weights_that_change_scale_what_remains():
     states, seen = start_states(sparse_bins(change)), sparse_bins(bins * scale[..., None])
     again, remains = (one.full(4) for one in (states.scaled(scale).less(seen), states.less(sparse_bins(bins))))
     np.testing.assert_allclose(again, remains * scale[..., None], rtol=0.0, atol=1e-12)  # rounding
+
+
+def test_what_was_taken_out_is_restored():
+    """To rounding, of directions of which nine tenths and nearly all were taken out."""
+    rng = np.random.default_rng(3)
+    change, bins = (rng.standard_normal((12, 4, 3)) + 1j * rng.standard_normal((12, 4, 3)) for _ in range(2))
+    states = start_states(sparse_bins(change * [1.0, 30.0, 1000.0]))
+    again = states.restored(states.less(sparse_bins(bins))).full(4)
+    np.testing.assert_allclose(again, bins, rtol=0.0, atol=1e-9)
+
+
+def test_equations_with_the_states_of_another_plant_are_those_evaluated_with_it(problem):
+    """Of friction that yields over twice the slip, with their correction for noise; to rounding."""
+    x, report = np.zeros(len(problem.names)), lambda share: None
+    softer = {f"{kind}.{key}": 2.0 for kind in ("horizontal", "vertical") for key in ("seal_yield", "pad_yield")}
+    parameters = problem.machine.parameters
+    changes = {path: factor * parameters.number(path) for path, factor in softer.items() if path in parameters}
+    plant = make_plant(problem.machine.with_params(changes))
+
+    def evaluated(own):
+        normal = NormalEquations(own, x, report)
+        return normal.less(NoiseBias(normal, x, [report] * len(own.again)))
+
+    before, due = evaluated(problem), evaluated(problem.restarted(plant))
+    found = before.restarted(plant)
+    matrix, side = due.whole
+    assert abs(before.whole[0] - matrix).max() > 1e-3 * abs(matrix).max()
+    np.testing.assert_allclose(found.whole[0], matrix, rtol=0.0, atol=1e-9 * abs(matrix).max())
+    np.testing.assert_allclose(found.whole[1], side, rtol=0.0, atol=1e-9 * abs(side).max())
+
+
+@pytest.mark.parametrize("prepare", [policy_of(calibration_numbers()), AS_RECORDED._replace(edge=0.25)])
+def test_noise_of_the_first_sample_is_no_travel(base, prepare):
+    """A motion fused from sensors begins at the noise of its first sample: what is held is not lost from there.
+
+    A first sample that is off by 50 micrometres moved states by a sixth of full friction.
+    """
+    record = load_record(RECORDS / "practice_a_TX.nc")
+    other = record.copy(deep=True)
+    other["platen_displacement"].values[0, :3] += 5e-5
+    states = []
+    for one in (record, other):
+        test = prepare_test(base.plant, one, load_sensors("lhpost6"), prepare)
+        z = follow(base.plant, test, start=drawn(base.plant, 0.8)).z
+        states.append(z[test.settled : test.settled + 50])
+    assert abs(states[0]).max() > 0.5
+    assert abs(states[0] - states[1]).max() < 0.01
 
 
 def test_columns_in_which_no_state_shows_are_left_as_they_are():

@@ -277,7 +277,9 @@ def _begin(
         problem, first = problem.only(used), first.only(used)
     begun = refit(problem, first, numbers, calibration, between(progress, 0.26, 0.86))
     begun = with_lost_motion(begun, lost, between(progress, 0.86, 0.93))
-    rubbed, held_problem = with_friction_form(begun, every.only(held) if held else None, between(progress, 0.93, 1.0))
+    fitted = problem.plant_at(begun.refit.x)
+    held_problem = every.only(held).restarted(fitted) if held else None
+    rubbed, held_problem = with_friction_form(begun, held_problem, between(progress, 0.93, 1.0))
     return SearchCheckpoint(machine, held, held_problem, rubbed)
 
 

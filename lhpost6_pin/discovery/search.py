@@ -32,11 +32,13 @@ def refit(
     """Start of a search: parameters and sensor errors fitted to a campaign, without any effect.
 
     begin are its normal equations where all unknowns are zero. The residual is then weighed by the noise at the fitted
-    parameters: soft oil, for instance, amplifies it in the flows.
+    parameters: soft oil, for instance, amplifies it in the flows. And what friction holds at the start of tests is as
+    theirs: how long, depends on yield slips.
     """
     zero = np.zeros(len(problem.prior))
     first = solve(problem, calibration, zero, between(progress, 0.0, 0.85), first=begin, frugal=True)
-    normal = first.normal.reweighed(noise_at(problem, zero), noise_at(problem, first.x))
+    normal = first.normal.restarted(problem.plant_at(first.x))
+    normal = normal.reweighed(noise_at(problem, zero), noise_at(normal.problem, first.x))
     part = between(progress, 0.85, 1.0)
     solution = solve(normal.problem, calibration, first.x, part, normal, frugal=True, settled=True)
     return Search(normal.problem, solution, solution, numbers, calibration)

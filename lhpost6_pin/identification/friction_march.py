@@ -87,7 +87,7 @@ def _sliding(plant: Plant, test: MeasuredTest, least: float) -> Array | None:
     if test.path is None:
         return None
     axes = plant.axes[plant.axes < 3]
-    noise = np.abs(test.motion.displacement - test.path)[:, axes].max(axis=0, initial=0.0)
+    noise = np.abs(test.motion.displacement - test.path)[test.settled :, axes].max(axis=0, initial=0.0)
     if not np.any(noise > SHAKEN * least):
         return None
     travel = np.abs(test.motion.velocity[:, axes]) * test.dt

@@ -125,9 +125,9 @@ def start_of_record(plant: Plant, record: xr.Dataset, sensors: SensorSet | None)
     """
     if sensors is None:
         require(record, *MOTION)
-    cutoff = _number("comparison.cutoff")
-    band = Band(high=cutoff, order=int(_number("comparison.order")))
-    return estimate_start(plant, prepare_test(plant, record, sensors, AS_RECORDED._replace(band=band)), cutoff)
+    cutoff, edge = _number("comparison.cutoff"), _number("comparison.edge")
+    policy = AS_RECORDED._replace(band=Band(high=cutoff, order=int(_number("comparison.order"))), edge=edge)
+    return estimate_start(plant, prepare_test(plant, record, sensors, policy), cutoff)
 
 
 def start_note(plant: Plant, start: Array) -> str:

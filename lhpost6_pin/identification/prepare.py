@@ -51,6 +51,7 @@ class Policy(NamedTuple):
     rate: float = np.inf  # faster records are decimated to the next rate above [Hz]
     band: Band | None = None  # of a motion without accelerometers; by default the sensors' own
     pressure_cutoff: float | None = None  # up to which pressures are differentiated [Hz]; None: they are not
+    edge: float = 0.0  # at the start of a test [s], in which filters settle
 
 
 PRESSURE_ORDER = 16
@@ -75,6 +76,7 @@ class MeasuredTest:
     channels: Mapping[str, Array]  # (n, k) each, by name of the layout
     rates: Mapping[str, Array] = field(default_factory=dict)  # (n, k) of differentiated channels [unit/s]
     path: Array | None = None  # (n, 6) displacement that friction follows, where it is not the motion's
+    settled: int = 0  # samples at the start of that path in which filters settle, where it rests
     share: Mapping[str, PlatenMotion] = field(default_factory=dict)  # of each platen channel in the motion
     used: tuple[str, ...] = ()  # channels that the motion was fused from; none: a simulated record's own
     side: Array | None = None  # (2, n, n_actuators) of its play on which a pin stands, -1 to 1, and rate; NaN: unknown
@@ -215,7 +217,20 @@ def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, po
     fused = fuse_motion(plant, record, sensors, band=band, shares=policy.shares)
     _warn_of_strokes(plant, name, record, fused.motion)
     side = _contact_side(plant, record, fused.motion, dt, cutoff)
-    return MeasuredTest(name, dt, fused.motion, channels, rates, fused.path, fused.share, fused.used, side, record)
+    settled = min(round(policy.edge / dt), len(fused.path) - 1)
+    path = _at_rest(fused.path, settled)
+    return MeasuredTest(
+        *(name, dt, fused.motion, channels, rates, path, settled, fused.share, fused.used, side, record)
+    )
+
+
+def _at_rest(path: Array, settled: int) -> Array:
+    """A path (n, 6) that stays where it is when filters have settled, until then.
+
+    They begin at the noise of a single sample. What friction holds at the start would be lost on the way from there,
+    by as much as its yield slip; in a platen that moves it is lost soon after, in any case.
+    """
+    return np.concatenate([np.repeat(path[settled : settled + 1], settled, axis=0), path[settled:]])
 
 
 def prepare_noisier(

@@ -10,10 +10,12 @@ from ...core.arrays import Array, Complex, Mask
 from ...core.progress import Progress
 from ...core.threads import by_threads
 from ...machine.parameters import Parameters
+from ...mechanics.plant import Plant
 from .bin_rows import BandSquares, BinRows, bin_rows, row_by_column
 from .operating_point import OperatingPoint
 from .problem import Problem, Slopes
-from .sparse_bins import SparseBins
+from .sparse_bins import SparseBins, sparse_bins
+from .start_states import StartStates
 from .whitened_residuals import excess
 
 __all__ = ["NoiseBias", "NormalEquations", "bounded_step", "bounds_of", "positive"]
@@ -69,6 +71,21 @@ class NormalEquations:
         other.residual = [r * s for r, s in zip(self.residual, times, strict=True)]
         other.slope = [[j.times(s) for j in slopes] for slopes, s in zip(self.slope, times, strict=True)]
         return other if self.bias is None else other.less(self.bias.scaled(times))
+
+    def restarted(self, plant: Plant) -> "NormalEquations":
+        """The same with friction's states at the start of tests as they act on a plant."""
+        other = self._copied()
+        other.problem = self.problem.restarted(plant)
+        starts = list(zip(self.problem.starts, other.problem.starts, strict=True))
+        other.residual, other.slope = _restarted(starts, self.residual, self.slope)
+        if self.bias is None:
+            return other
+        bias = copy(self.bias)
+        bias.problem = other.problem
+        pairs = zip(self.bias.residual, self.bias.slope, strict=True)
+        bias.residual, bias.slope = map(list, zip(*(_restarted(starts, *one) for one in pairs), strict=True))
+        _forget_sums(bias)
+        return other.less(bias)
 
     def reweighed(self, before: Array, now: Array) -> "NormalEquations":
         """The same, weighed by noise whose mean squares (t, b, c) have changed since its weights were set."""
@@ -201,6 +218,17 @@ class NoiseBias:
     def squares(self) -> list[list[BandSquares]]:
         """Products of these rows with each other, by replica and test."""
         return [_squares(self.problem, rows) for rows in self.rows]
+
+
+def _restarted(
+    starts: Sequence[tuple[StartStates, StartStates]],
+    residual: Sequence[Complex],
+    slope: Sequence[Sequence[SparseBins]],
+) -> tuple[list[Complex], list[list[SparseBins]]]:
+    """Residuals and derivatives of every test less what its second states at the start explain, not its first."""
+    each = list(zip(starts, residual, slope, strict=True))
+    rest = [now.less(was.restored(sparse_bins(r))).full(r.shape[1]) for (was, now), r, _ in each]
+    return rest, [[now.less(was.restored(j)) for j in slopes] for (was, now), _, slopes in each]
 
 
 def _forget_sums(one: NormalEquations | NoiseBias) -> None:

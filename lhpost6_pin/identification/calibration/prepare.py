@@ -109,8 +109,8 @@ def as_simulated(problem: Problem, machine: Machine) -> Machine:
 
 def policy_of(numbers: Parameters) -> Policy:
     """How records are prepared by the numbers of `models/procedures/calibration.toml`."""
-    rate, cutoff = (numbers.number(f"comparison.{key}") for key in ("rate", "pressure_cutoff"))
-    return CALIBRATION._replace(rate=rate, pressure_cutoff=cutoff)
+    rate, cutoff, edge = (numbers.number(f"comparison.{key}") for key in ("rate", "pressure_cutoff", "edge"))
+    return CALIBRATION._replace(rate=rate, pressure_cutoff=cutoff, edge=edge)
 
 
 def _refuse(machine: Machine, records: Sequence[xr.Dataset], comparison: ResidualBands) -> None:

@@ -172,6 +172,10 @@ class Problem:
         each = enumerate(zip(self.starts, self.frequency, strict=True))
         return self._with(whitener=whitener, starts=[one.scaled(scale[t, whitener.band(f)]) for t, (one, f) in each])
 
+    def restarted(self, plant: Plant) -> "Problem":
+        """The same problem with friction's states at the start of tests as they act on a plant."""
+        return self._with(starts=[self._starts(plant, t) for t in range(len(self.tests))])
+
     def only(self, places: Sequence[int]) -> "Problem":
         """The same problem with some of its tests; noise is weighed as with all."""
         return self._with(

@@ -33,6 +33,14 @@ class StartStates(NamedTuple):
 
     def less(self, some: SparseBins) -> SparseBins:
         """Whitened bins less what states at the start explain of them."""
+        return self._along(some, -self.removed)
+
+    def restored(self, some: SparseBins) -> SparseBins:
+        """Whitened bins of which `less` has left some."""
+        return self._along(some, self.removed / (1.0 - self.removed))
+
+    def _along(self, some: SparseBins, share: Array) -> SparseBins:
+        """Whitened bins and shares (s,) of what lies along each direction."""
         if not (len(self.removed) and np.isin(self.columns, some.columns).any()):
             return some
         columns = np.union1d(self.columns, some.columns)
@@ -41,7 +49,7 @@ class StartStates(NamedTuple):
         places = np.searchsorted(columns, self.columns)
         own = out[places].swapaxes(0, 1)
         flat = _parts(own)
-        flat -= ((flat @ self.duals.T) * self.removed) @ self.directions
+        flat += ((flat @ self.duals.T) * share) @ self.directions
         out[places] = flat.view(np.complex128).reshape(own.shape).swapaxes(0, 1)
         return SparseBins(columns, out.reshape(len(columns), *some.bins.shape[1:]))
 

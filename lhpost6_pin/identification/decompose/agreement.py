@@ -171,7 +171,7 @@ def summed(found: Decomposed, changes: Iterable[Change]) -> Changes:
 
 def _noise(found: Decomposed, sensors: SensorSet, rng: np.random.Generator) -> Change:
     """Change by a second draw of noise."""
-    policy = AS_RECORDED._replace(band=found.comparison.band)
+    policy = AS_RECORDED._replace(band=found.comparison.band, edge=found.comparison.edge)
     noisier = prepare_noisier(found.plant, found.record, sensors, policy, rng)
     drawn = decompose_test(found.mounted, noisier, found.whole.states.z[0])[0]
     return Change(drawn.residual - found.whole.residual, drawn.carried - found.whole.carried)

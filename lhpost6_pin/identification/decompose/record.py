@@ -143,7 +143,7 @@ def decompose_record(
         sensors = None
     delays = find_delays(plant, [record], policy)
     warn_of_skews(delays, sensors)
-    test = prepare_test(plant, align_record(record, delays), sensors, policy._replace(band=band))
+    test = prepare_test(plant, align_record(record, delays), sensors, policy._replace(band=band, edge=comparison.edge))
     whole, notes = decompose_test(mounted, test)
     if delays:
         removed = ", ".join(f"{group} {1e3 * d.delay:+.3f} ms behind {d.reference}" for group, d in delays.items())

@@ -93,7 +93,7 @@ def prepare(machine: Machine, record: xr.Dataset, basis: ComparisonBasis) -> Pre
     table, sensors = machine.as_tested(record.attrs, "the test"), basis.sensors
     check_usable(table, record)
     plant = make_plant(table)
-    policy = AS_RECORDED._replace(band=basis.numbers.band)
+    policy = AS_RECORDED._replace(band=basis.numbers.band, edge=basis.numbers.edge)
     test = prepare_test(plant, record, sensors, policy)
     again = prepare_noisier(plant, record, sensors, policy, np.random.default_rng(SEED))
     time = record["time"].values

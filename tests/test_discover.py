@@ -37,6 +37,7 @@ from lhpost6_pin.discovery.estimates import (
     is_absorbed,
     moved_together,
 )
+from lhpost6_pin.discovery.fading import fading_effects
 from lhpost6_pin.discovery.floor import expected_gaps, model_at
 from lhpost6_pin.discovery.held_out import prove
 from lhpost6_pin.discovery.joint_fit import _best_start, fit_from_rival, fit_jointly, refined, with_candidate
@@ -73,6 +74,7 @@ from lhpost6_pin.discovery.searched_range import beyond_search, within_search
 from lhpost6_pin.discovery.unexplained import leaves_much
 from lhpost6_pin.discovery.verdict import judge, reject_effects
 from lhpost6_pin.discovery.verdict_file import summary
+from lhpost6_pin.discovery.verdict_notes import fading_note
 from lhpost6_pin.discovery.withdrawal import Withdrawn, lowers_squares, withdraw_effects
 from lhpost6_pin.effects.effect import Effect
 from lhpost6_pin.effects.evaluate import advance_states, apply_forces
@@ -80,7 +82,7 @@ from lhpost6_pin.effects.table import effect_table
 from lhpost6_pin.identification.calibration import calibration_numbers, fit
 from lhpost6_pin.identification.calibration.bin_rows import BinRows, bin_rows, row_by_column
 from lhpost6_pin.identification.calibration.fit import objective_at, solve
-from lhpost6_pin.identification.calibration.normal_equations import bounded_step, bounds_of
+from lhpost6_pin.identification.calibration.normal_equations import NormalEquations, bounded_step, bounds_of
 from lhpost6_pin.identification.calibration.operating_point import OperatingPoint
 from lhpost6_pin.identification.calibration.prepare import prepare_problem
 from lhpost6_pin.identification.calibration.problem import Problem
@@ -745,6 +747,42 @@ def test_an_effect_must_lower_some_column_of_held_out_tests_by_a_share_of_what_w
     first, before = np.array([1000.0, 100.0]), np.array([400.0, 100.0])
     assert lowers_squares(first, before, np.array([390.0, 95.0]), 0.03)
     assert not lowers_squares(first, before, np.array([380.0, 98.0]), 0.03)
+
+
+@pytest.mark.parametrize("time", [0.5, 2.0])
+def test_a_force_that_fades_is_no_spring(found, time):
+    """A spring on H4, explained to its noise; and one of which as much fades as stays, integrated by Euler's rule."""
+    search, stiffness = found.search, 3e5
+    spring = candidate("stray_spring", "H4")
+    own = spring.fit_parameters((stiffness,), search.numbers)
+    problem, x = with_candidate(search.problem, spring, (stiffness,), own, search.solution.x)
+    normal = NormalEquations(problem, x, lambda share: None, search.solution.normal)
+    added = replace(search.added[0], candidate=spring, from_lengths=0.0)
+
+    def fading(residual):
+        normal.residual = residual
+        solution = search.solution._replace(x=x, at=x, normal=normal, residual=residual)
+        more = replace(search, problem=problem, solution=solution, added=(added,))
+        linear = linearise(solution, search.calibration)
+        rejected = fading_effects(more, linear)
+        return rejected, judge(more, (), (), (), (), rejected)
+
+    elastic = list(search.residual)
+    assert fading(elastic)[0] == ()
+    base, place, left = OperatingPoint(problem, x), problem.machine.actuator_names.index("H4"), []
+    for t, (test, rest) in enumerate(zip(base.tests, elastic, strict=True)):
+        along = leg_displacements(base.plant, test.motion.displacement)[0][:, place]
+        unit = leg_wrenches(base.plant, plant_motion(base.plant, test.motion).q, np.ones((len(along), 10)))[:, place]
+        past, y = np.zeros(len(along)), along[0]
+        for i, now in enumerate(along):
+            y += test.dt / time * (now - y)
+            past[i] = y
+        wrench = -stiffness * (along - past)[:, None] * unit
+        left.append(rest + problem.whitened(t, problem.of_wrench(t, wrench[..., None])).full(rest.shape[1])[..., 0])
+    (one,), verdict = fading(left)
+    assert one.candidate == spring and one.memory == time and one.gain > 100.0
+    assert (verdict.word, verdict.nearest, verdict.effects) == ("unexplained", ("stray_spring",), ())
+    assert f"fades in about {time:g} s" in fading_note(verdict)
 
 
 def test_an_effect_at_a_bound_is_no_finding(found):

@@ -42,14 +42,17 @@ class HeldOut(NamedTuple):
 
 
 def residual_at(held: Problem, solution: Solution | None = None) -> HeldOut:
-    """Held-out residuals of a solution of the search; without one, as delivered, with sensors as stated."""
+    """Held-out residuals of a solution of the search; without one, as delivered, with sensors as stated.
+
+    What friction holds at the start of tests is taken out as it acts on that machine.
+    """
     if solution is None:
         problem, x = held.with_machine(held.machine, ()), np.zeros(len(held.unknowns))
     else:
         own = solution.normal.problem
         problem, x = held.with_machine(own.machine, own.parameters), solution.x
     base = OperatingPoint(problem, x)
-    return HeldOut(base, problem.residual(base))
+    return HeldOut(base, problem.restarted(base.plant).residual(base))
 
 
 def evaluate_balances(held: Problem, three: Sequence[HeldOut]) -> tuple[Balance, ...]:

@@ -30,6 +30,7 @@ from .candidates import with_background, with_other_form, with_warm_oil
 from .checkpoint import SearchCheckpoint, make_checkpoint
 from .effect_loops import EffectLoop, effect_loops
 from .estimates import at_bounds, deviations, estimates_of
+from .fading import fading_effects
 from .friction_form import with_friction_form
 from .held_out import Proof, prove
 from .lost_motion import LostMotion, lost_motion, with_lost_motion, with_rod_lengths
@@ -129,7 +130,7 @@ def discover(
         found, linear = kept, linearise(kept.solution, calibration)
     beside, replacing = _residual_functions(found, linear)
     report(0.8)
-    verdict = judge(found, beside, replacing, faults, withdrawn)
+    verdict = judge(found, beside, replacing, faults, withdrawn, fading_effects(found, linear))
     ambiguous = propose and verdict.word == "ambiguous"
     tests = next_tests(found, load_controller(machine.controller), sensors) if ambiguous else ()
     for one in found.added:  # what is validated is the model that is delivered
@@ -277,9 +278,7 @@ def _begin(
         problem, first = problem.only(used), first.only(used)
     begun = refit(problem, first, numbers, calibration, between(progress, 0.26, 0.86))
     begun = with_lost_motion(begun, lost, between(progress, 0.86, 0.93))
-    fitted = problem.plant_at(begun.refit.x)
-    held_problem = every.only(held).restarted(fitted) if held else None
-    rubbed, held_problem = with_friction_form(begun, held_problem, between(progress, 0.93, 1.0))
+    rubbed, held_problem = with_friction_form(begun, every.only(held) if held else None, between(progress, 0.93, 1.0))
     return SearchCheckpoint(machine, held, held_problem, rubbed)
 
 

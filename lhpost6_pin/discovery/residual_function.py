@@ -27,7 +27,14 @@ from .candidate_columns import whitened_rows
 from .scores import make_block, score
 from .search_state import Linearisation, Search
 
-__all__ = ["Formula", "ResidualFunction", "fit_residual_functions", "sparse_formula", "with_residual_function"]
+__all__ = [
+    "Formula",
+    "ResidualFunction",
+    "fit_residual_functions",
+    "remembered",
+    "sparse_formula",
+    "with_residual_function",
+]
 
 State = Literal["position", "velocity", "recent travel", "past position"]
 Form = tuple[Array, tuple[str, ...]]
@@ -156,12 +163,17 @@ def _state(state: State, memory: float, position: Array, velocity: Array, dt: fl
         return velocity
     if not memory:
         return position
+    past = remembered(position, memory, dt)
+    return past if state == "past position" else position - past
+
+
+def remembered(x: Array, memory: float, dt: float) -> Array:
+    """The fading memory y of a signal x (n, k), T dy/dt + y = x with T = `memory` [s]; at rest where it begins."""
     from scipy.signal import lfilter
 
     stay, first, last = filter_shares(dt, memory)
-    start = (1.0 - last) * position[0]  # at rest where it begins
-    past, _ = lfilter([last, first], [1.0, -stay], position, axis=0, zi=start[None])
-    return np.asarray(past if state == "past position" else position - past)
+    start = (1.0 - last) * x[0]
+    return np.asarray(lfilter([last, first], [1.0, -stay], x, axis=0, zi=start[None])[0])
 
 
 def _hats(x: Array, nodes: Array) -> Array:

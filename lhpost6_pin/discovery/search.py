@@ -59,7 +59,7 @@ def search(found: Search, keep: Callable[[Search], None], progress: Progress) ->
         if more is None:
             break
         del linear  # as large as the next one
-        found = more
+        found = more.restarted(lambda share: None)
         keep(found)
     fewer = _pruned(found)
     if fewer.solution is not found.solution:

@@ -119,6 +119,16 @@ class Search:
         solution = self.solution._replace(x=x, at=x, normal=normal.released(), residual=normal.residual)
         return replace(self, solution=solution, without={})
 
+    def restarted(self, progress: Progress) -> "Search":
+        """The search with friction's states at the start of tests as they act on its machine, solved again from there.
+
+        How long what is held there lasts, depends on its numbers.
+        """
+        x, normal = self.solution.x, self.solution.normal
+        normal = normal.restarted(self.problem.plant_at(x))
+        here = replace(self, problem=normal.problem, solution=self.solution._replace(normal=normal))
+        return here.solved(here.problem, x, progress, settled=True)
+
     @cached_property
     def covariance(self) -> Array:
         """Covariance (p, p) of the unknowns by the expected scatter, the priors of effects' own parameters flat."""

@@ -14,6 +14,7 @@ from ..identification.calibration.scale import Scale, ratios
 from ..machine.parameters import Parameters
 from .acceptance import form_share
 from .estimates import Estimate, amplitude_of, at_bounds, covariance_of, estimates_of, interval_reach, owns, sums_of
+from .fading import Fading
 from .finding import EffectFinding, alternatives_of, p_value_of
 from .localise import Spot, worst_spots
 from .outlying import outlying_parameters
@@ -59,6 +60,7 @@ class Verdict:
     ratios: Mapping[str, Estimate] = field(default_factory=dict)  # to that scale, of what was estimated
     sums: Mapping[tuple[str, str], Estimate] = field(default_factory=dict)  # of unknowns that have no interval alone
     remainder: Mapping[str, float] = field(default_factory=dict)  # of the squares beyond noise, by kind of residual
+    fading: tuple[Fading, ...] = ()  # forces that were taken for elastic ones
 
 
 def judge(
@@ -67,12 +69,13 @@ def judge(
     replacing: Functions,
     faults: Sequence[SensorFault],
     withdrawn: tuple[Withdrawn, ...],
+    fading: tuple[Fading, ...] = (),
 ) -> Verdict:
     """The verdict on a search.
 
     beside are residual functions fitted in addition to the effects, replacing those fitted in their place, both by
     falling gain; faults are of sensors whose records were corrected before; `withdrawn` effects are no findings, though
-    they may be in the search.
+    they may be in the search; those `fading` are not what they were taken for.
     """
     problem, x, numbers, calibration = found.problem, found.solution.x, found.numbers, found.calibration
     own = tuple(f"{one.candidate.name}." for one in found.added)
@@ -104,6 +107,8 @@ def judge(
     changed = {name: estimate for name, estimate in estimates.items() if name in differs}
     function, rejected = reject_effects(kept, beside, replacing, numbers)
     rejected |= {one.candidate.name for one in kept if not one.from_lengths and leaves_much(one, kept, found)}
+    fading = tuple(one for one in fading if one.candidate.name not in gone)
+    rejected |= {one.candidate.name for one in fading}
     bounded = at_bounds(found)
     drifting = any(fault.kind == "drift" for fault in faults)  # of a sensor, or of its mount
     unexplained = function is not None or bool(rejected) or drifting or more_than_noise(found)
@@ -135,6 +140,7 @@ def judge(
         scale=problem.scale,
         ratios={name: Estimate(*ratio) for name, ratio in scaled.items()},
         remainder=remainders(found) if effects else {},
+        fading=fading,
         sums={names: total for names, total in sums_of(found, covariance).items() if set(names) & set(changed)},
     )
 

@@ -21,7 +21,7 @@ from .floor import NOISE
 from .search_state import Round
 from .unexplained import forces_explained
 from .verdict import SensorFinding
-from .verdict_notes import before_screening, drift_note, interval_note, open_summary, refit_summary
+from .verdict_notes import before_screening, drift_note, fading_note, interval_note, open_summary, refit_summary
 from .withdrawal import Why
 
 __all__ = ["advice", "save_verdict", "summary", "title_of", "verdict_entries", "where", "worse_note"]
@@ -171,6 +171,9 @@ def _unexplained(found: Discovery) -> dict[str, Any] | None:
             {"residual": s.kind, "column": s.label, "band": list(s.band), "misfit": s.misfit}
             for s in found.verdict.where
         ],
+        "fading": [
+            {"effect": one.candidate.name, "memory": one.memory, "gain": one.gain} for one in found.verdict.fading
+        ],
     }
     if function is None:
         return {**known, "component": None, "depends_on": "not known"}
@@ -301,8 +304,8 @@ def _unexplained_summary(found: Discovery, effects: str) -> str:
     function, place = verdict.residual_function, "the residual exceeds the expected scatter"
     if function is not None:
         place = f"an effect acts on {where(function.components)}, as a function of {function.description}"
-    elif drifts := drift_note(verdict):
-        place = drifts
+    elif note := drift_note(verdict) or fading_note(verdict):
+        place = note
     near = f" Nearest family: {' and '.join(map(title_of, verdict.nearest))}." if verdict.nearest else ""
     return f"{effects + '; in addition ' if effects else ''}{place}; no family of the library explains it.{near}"
 

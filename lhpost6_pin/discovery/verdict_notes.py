@@ -22,6 +22,7 @@ __all__ = [
     "balance_note",
     "before_screening",
     "drift_note",
+    "fading_note",
     "floor_note",
     "form_note",
     "interval_note",
@@ -178,6 +179,16 @@ def drift_note(verdict: "Verdict") -> str:
     drifts = f"drift{'s' * (len(drifting) == 1)} against the platen's pose within tests"
     cause = "a rod that lengthens with heat, a mount that creeps, or the zero of a sensor"
     return f"{', '.join(drifting)} {drifts} ({cause})" if drifting else ""
+
+
+def fading_note(verdict: "Verdict") -> str:
+    """Forces found that fade, which no elastic one does; empty without any."""
+    each = [
+        f"{find_family(one.candidate.family.named).title} ({', '.join(one.candidate.components)}) fades in about "
+        f"{one.memory:g} s while it is held (gain {one.gain:.0f})"
+        for one in verdict.fading
+    ]
+    return f"what was fitted as {' and '.join(each)}, as a viscoelastic mount does" if each else ""
 
 
 def balance_note(balances: Sequence[Balance]) -> str:

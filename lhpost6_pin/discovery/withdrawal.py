@@ -130,8 +130,8 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     expected, and is one of two of a family or explains a good part of that. Where nothing is beyond noise without it,
     no form of another effect can pass for it, and any gain speaks for it: with it the gain has mean `expected`,
     without it -expected. One that the held-out tests do not excite, with an expected gain within chance, stays, unless
-    it loses more than by chance there. On a table with one actuator these two do not hold: every test excites it, and
-    few sensors leave much to be confused.
+    it loses more than by chance there, and than a small share of its gain. On a table with one actuator these two do
+    not hold: every test excites it, and few sensors leave much to be confused.
     """
     if one.candidate.release and one.candidate.release in {u.name for u in found.problem.unknowns}:
         return None  # a sensor's error
@@ -143,7 +143,7 @@ def _by_held_out(found: Search, one: AddedEffect, held: Problem, original: HeldO
     gain, expected = gain_on(held, before, after, rows)
     withdrawn = Withdrawn(one.candidate.name, family.named, "held_out", gain=gain)
     if not single and expected <= n("accept.chance"):
-        return withdrawn if gain < -n("accept.chance") else None
+        return withdrawn if gain < -max(n("accept.chance"), n("accept.idle") * one.gain) else None
     share = share_explained(held, before.whitened, after.whitened, family, found.numbers)
     if not single and np.isnan(share):
         return withdrawn if gain < 0.0 else None

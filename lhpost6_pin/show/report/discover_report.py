@@ -17,6 +17,7 @@ from ...discovery.verdict_notes import (
     balance_note,
     before_screening,
     drift_note,
+    fading_note,
     floor_note,
     form_note,
     interval_note,
@@ -269,7 +270,7 @@ def _effect_blocks(found: Discovery) -> list[Block]:
         blocks.append(residual_function_figure(verdict.residual_function))
     elif verdict.word == "unexplained":
         none = "The residual is no function of an actuator's or strut's position or velocity"
-        blocks.append(f"{drift_note(verdict) or none}.")
+        blocks.append(f"{drift_note(verdict) or fading_note(verdict) or none}.")
     if verdict.where:
         blocks.append(f"The largest residuals are in: {'; '.join(s.description for s in verdict.where)}.")
     if verdict.nearest:

@@ -979,10 +979,11 @@ def test_no_strength_that_leaves_the_platen_no_inertia_is_fitted(found):
     np.testing.assert_array_equal(started(found.search, mass, far)[0], typical)
 
 
-def started(search, one, amplitude, strengths=(1.0,), change=0.0, afresh=False):
+def started(search, one, amplitude, strengths=(1.0,), change=0.0, afresh=False, moved=True):
     """Where a joint fit of a candidate begins, by its linear estimate with a change of all else."""
-    none, moved = np.zeros(len(amplitude)), np.zeros(len(search.problem.names)) + change
-    return _best_start(search, one, Score(1.0, np.asarray(amplitude), none, none, moved), strengths, afresh=afresh)
+    none, changes = np.zeros(len(amplitude)), np.zeros(len(search.problem.names)) + change
+    score = Score(1.0, np.asarray(amplitude), none, none, changes)
+    return _best_start(search, one, score, strengths, afresh=afresh, moved=moved)
 
 
 def test_a_joint_fit_begins_with_what_else_the_linear_estimate_moves_if_that_explains_more(found):
@@ -997,11 +998,11 @@ def test_a_joint_fit_begins_with_what_else_the_linear_estimate_moves_if_that_exp
     amplitude, moved = started(search, one, [less], change=-1.0 * np.array(leakage))
     assert amplitude == (less,)
     np.testing.assert_allclose(moved - at, -prior * np.array(leakage))
-    for options in ({"change": np.array(leakage)}, {"afresh": True}):
+    for options in ({"change": np.array(leakage)}, {"afresh": True, "moved": False}):
         _, x = started(search, one, [less], **options)
         np.testing.assert_array_equal(x, 0.0 * at if options.get("afresh") else at)
     other = Score(1.0, np.array([less]), np.zeros(1), np.zeros(1), np.ones(len(at) - 1))  # beside one effect less
-    np.testing.assert_array_equal(_best_start(search, one, other, (1.0,), afresh=False)[1], at)
+    np.testing.assert_array_equal(_best_start(search, one, other, (1.0,), afresh=False, moved=True)[1], at)
 
 
 def test_a_candidate_without_derivatives_is_not_fitted(found, monkeypatch):

@@ -49,10 +49,11 @@ class JointFit(NamedTuple):
 def fit_jointly(found: Search, one: Scored, progress: Progress, best: JointFit | None = None) -> JointFit:
     """The search with a candidate fitted jointly with all parameters, from its linear estimate.
 
-    Where that ends higher than without the candidate, all derivatives are evaluated at its steps. Where the residual
-    stays large, it is fitted from the stated parameters, too, since a missing effect may have biased them out of reach;
-    and from other shapes that explain nearly as much. From as many starts as the `best` rival so far required; then no
-    more where that leaves little, and this one is far behind it.
+    Where that ends higher than without the candidate, it also begins with all else moved as estimated, which may end
+    with sensors' errors at their bounds, and with all derivatives evaluated at its steps. Where the residual stays
+    large, it is fitted from the stated parameters, too, since a missing effect may have biased them out of reach; and
+    from other shapes that explain nearly as much. From as many starts as the `best` rival so far required; then no more
+    where that leaves little, and this one is far behind it.
     """
     n = found.numbers.number
     near = [s for s in found.rounds[-1].scored if s.gain >= n("accept.near") * one.gain]
@@ -62,7 +63,10 @@ def fit_jointly(found: Search, one: Scored, progress: Progress, best: JointFit |
     for (start, afresh), part in zip(starts, split(progress, len(starts)), strict=True):
         fit = _fit_from(found, start, part, afresh=afresh)
         if fit.objective >= found.objective and not fits:  # derivatives reused are too far off
-            fit = min(fit, _fit_from(found, start, part, afresh=afresh, reused=False), key=lambda one: one.objective)
+            fit = min(
+                (fit, *(_fit_from(found, start, part, **how) for how in ({"moved": True}, {"reused": False}))),
+                key=lambda one: one.objective,
+            )
         fits.append(fit)
         if best is not None and len(fits) < best.starts:
             continue
@@ -95,9 +99,12 @@ def fit_from_rival(found: Search, one: Scored, rival: Scored, fitted: Search, pr
     return found.solved(*start, progress, settled=True)
 
 
-def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool, reused: bool = True) -> Search:
+def _fit_from(
+    found: Search, one: Scored, progress: Progress, *, afresh: bool = False, moved: bool = False, reused: bool = True
+) -> Search:
     """The search with a candidate fitted jointly, from the present solution or from the stated parameters (`afresh`).
 
+    Or from the present solution with all unknowns `moved` as the linear estimate moves them, if that explains more.
     Derivatives by everything else are `reused`: mostly accurate enough to compare candidates. The search as it is where
     a fit comes so near to numbers that make no machine that it has no derivatives.
     """
@@ -108,7 +115,7 @@ def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool, r
     else:
         far = found.power >= found.numbers.number("accept.settled")
         strengths = found.numbers.vector("accept.strengths") if far else (1.0,)
-        amplitudes, start = _best_start(found, candidate, one.score, strengths, afresh=afresh)
+        amplitudes, start = _best_start(found, candidate, one.score, strengths, afresh=afresh, moved=moved)
         own = candidate.fit_parameters(amplitudes, found.numbers)
         problem, start = with_candidate(problem, candidate, amplitudes, own, start)
     # derivatives that change much with an effect: for one of the oil, those by numbers of oil and valves
@@ -121,11 +128,11 @@ def _fit_from(found: Search, one: Scored, progress: Progress, *, afresh: bool, r
 
 
 def _best_start(
-    found: Search, candidate: Candidate, one: Score, strengths: Sequence[float], *, afresh: bool
+    found: Search, candidate: Candidate, one: Score, strengths: Sequence[float], *, afresh: bool, moved: bool
 ) -> tuple[tuple[float, ...], Array]:
     """Amplitudes (q,) of a candidate, and all other unknowns (p,), with which it explains most.
 
-    Of the linear estimate times the factor of some, and of that with all else moved as it estimates: without that a
+    Of the linear estimate times the factor of some, and of that with all else `moved` as it estimates: without that a
     residual may first grow in bands that then count as noise. Far from the optimum the estimate may be several times
     too small or too large. Where none of them makes a machine, zero; typical sizes where residuals are not linear in
     the amplitudes.
@@ -133,10 +140,10 @@ def _best_start(
     at, least = found.solution.at, np.inf
     zero = [0.0 if candidate.family.linear else s.typical for s in candidate.amplitudes]
     starts = [(factor, np.zeros_like(at) if afresh else at) for factor in strengths]
-    if not afresh and len(one.change) == len(at):  # not of a candidate that was scored beside other effects
+    if moved and len(one.change) == len(at):  # not of a candidate that was scored beside other effects
         low, high = bounds_of(found.problem, found.calibration)
-        moved = at + one.change * found.problem.prior
-        starts.append((1.0, np.clip(moved, np.minimum(low, at), np.maximum(high, at))))
+        there = at + one.change * found.problem.prior
+        starts.append((1.0, np.clip(there, np.minimum(low, at), np.maximum(high, at))))
     best = tuple(zero), starts[0][1]
     for factor, x in starts:
         tried = tuple(np.clip(factor * one.amplitude, *candidate.bounds).tolist())

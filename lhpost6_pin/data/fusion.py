@@ -48,6 +48,7 @@ class FusedMotion(NamedTuple):
     path: Array  # (n, 6) displacement, constant where it rests: for the memory of friction, which noise would erase
     used: tuple[str, ...]
     share: Mapping[str, PlatenMotion]  # of each channel in the motion, which is their sum; empty if not requested
+    sample: Array  # (6,) standard deviation of a displacement before fusion, at which the motion begins
 
 
 class _Sensor(NamedTuple):
@@ -109,7 +110,8 @@ def fuse_motion(
     gains = [np.exp(-((omega * width) ** 2) / 2) for width in (0.0, *WIDTHS)]
     lost = [_deviation(f, power * (wider - narrower) ** 2) for narrower, wider in pairwise(gains)]
     share = {name: alone(order, part) for name, order, part in channels} if shares else {}
-    return FusedMotion(motion, noise, quieted(motion.displacement, lost, dt), used, share)
+    sample = _deviation(f, displacement.spectrum)
+    return FusedMotion(motion, noise, quieted(motion.displacement, lost, dt), used, share, sample)
 
 
 def _displacement(plant: Plant, record: xr.Dataset, sensors: SensorSet, f: Array) -> tuple[_Sensor, dict[str, Array]]:

@@ -57,6 +57,10 @@ class Policy(NamedTuple):
 PRESSURE_ORDER = 16
 """Order of the low-pass of differentiated channels: at half its cutoff it takes less than 2e-5."""
 
+RESTS = 20.0
+"""Travel over the noise of a sample up to which an axis rests while filters settle: noise of the first sample and the
+offset of an accelerometer moved one at rest by up to 8 in a sealed case."""
+
 ROD_LENGTH, HALF_PLAY = "rod_displacement", "half_play"
 """Variable (time, actuator) that discovery adds to a record: lengths [m] of rods whose pin is loose, less the errors of
 their sensors, NaN for others; and its attribute: by how much each is loose, to either side [m]."""
@@ -76,7 +80,7 @@ class MeasuredTest:
     channels: Mapping[str, Array]  # (n, k) each, by name of the layout
     rates: Mapping[str, Array] = field(default_factory=dict)  # (n, k) of differentiated channels [unit/s]
     path: Array | None = None  # (n, 6) displacement that friction follows, where it is not the motion's
-    settled: int = 0  # samples at the start of that path in which filters settle, where it rests
+    settled: int = 0  # samples at the start of that path in which filters settle, where an axis at rest stays
     share: Mapping[str, PlatenMotion] = field(default_factory=dict)  # of each platen channel in the motion
     used: tuple[str, ...] = ()  # channels that the motion was fused from; none: a simulated record's own
     side: Array | None = None  # (2, n, n_actuators) of its play on which a pin stands, -1 to 1, and rate; NaN: unknown
@@ -218,19 +222,22 @@ def prepare_test(plant: Plant, record: xr.Dataset, sensors: SensorSet | None, po
     _warn_of_strokes(plant, name, record, fused.motion)
     side = _contact_side(plant, record, fused.motion, dt, cutoff)
     settled = min(round(policy.edge / dt), len(fused.path) - 1)
-    path = _at_rest(fused.path, settled)
+    path = _at_rest(fused.path, settled, fused.sample)
     return MeasuredTest(
         *(name, dt, fused.motion, channels, rates, path, settled, fused.share, fused.used, side, record)
     )
 
 
-def _at_rest(path: Array, settled: int) -> Array:
-    """A path (n, 6) that stays where it is when filters have settled, until then.
+def _at_rest(path: Array, settled: int, noise: Array) -> Array:
+    """A path (n, 6) that stays where it is when filters have settled, until then, on axes that do not move before.
 
-    They begin at the noise of a single sample. What friction holds at the start would be lost on the way from there,
-    by as much as its yield slip; in a platen that moves it is lost soon after, in any case.
+    Filters begin at the noise of a single sample, of deviations `noise` (6,), and with offsets of accelerometers. What
+    friction holds at the start would be lost on the way from there, by as much as its yield slip.
     """
-    return np.concatenate([np.repeat(path[settled : settled + 1], settled, axis=0), path[settled:]])
+    still = np.abs(path[:settled] - path[settled]).max(axis=0, initial=0.0) < RESTS * noise
+    out = path.copy()
+    out[:settled, still] = path[settled, still]
+    return out
 
 
 def prepare_noisier(

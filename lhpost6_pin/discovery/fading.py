@@ -34,11 +34,12 @@ class Fading(NamedTuple):
 
 def fading_effects(found: Search, linear: Linearisation) -> tuple[Fading, ...]:
     """The elastic effects added whose force fades: by `left.fades` of `discovery.toml`, also in cross-validation."""
+    elastic = [one for one in found.added if one.candidate.family.elastic]
+    if not elastic:
+        return ()
     n, weigh = found.numbers.number, Reweighting(found, linear.background)
     free, out = np.full(1, np.inf), list[Fading]()
-    for one in found.added:
-        if not one.candidate.family.elastic:
-            continue
+    for one in elastic:
         wrenches, best = _wrenches(linear, one), Fading(one.candidate, 0.0, 0.0)
         for memory in found.numbers.vector("left.memories"):
             pairs = zip(wrenches, linear.base.tests, strict=True)
